@@ -1,0 +1,26 @@
+/* Whole files: read into memory, written under a temporary name and renamed. */
+#ifndef LUMI_PROTO_BASE_FILE_H
+#define LUMI_PROTO_BASE_FILE_H
+
+#include "proto/base/result.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Reads a regular file of at most `limit` bytes (LUMI_ERR_LIMIT if it is larger). *data is released with lumi_free; a
+ * zero byte stands after its end, so that text can be parsed in place. */
+int lumi_file_read(const char *path, size_t limit, uint8_t **data, size_t *size, struct lumi_error *error);
+
+/* Makes or replaces a file: whole or not at all. `sync`: its bytes and its folder reach the disk before this returns.
+ */
+int lumi_file_write(const char *path, const void *data, size_t size, bool sync, struct lumi_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
