@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_mesh FOLDERS lightfield base)
