@@ -61,15 +61,19 @@ struct lumi_run {
     double radius;
     struct lumi_parameters parameters;
     int threads; /* as lumi_parallel_for */
-    bool quiet;  /* no progress */
+    /* Told after each image, by one thread at a time; may be NULL. */
+    void (*progress)(const char *title, long done, long total);
     struct lumi_run_private *priv;
 };
 
 void lumi_run_defaults(struct lumi_parameters *parameters);
 
-/* Reads the capture, makes the work directory. `work` NULL: "<capture>.work". */
+/* Reads the capture (every frame that has a pose, in the order of the positions), finds the surface its centres lie on,
+ * makes the work directory. `work` NULL: "<capture>.work". `alone`: nobody else works in it (LUMI_ERR_BUSY if somebody
+ * does), so what a killed run left half-written is removed; otherwise several runs may share it, each with its own
+ * range. The grid is chosen by the caller. */
 int lumi_run_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
-                  struct lumi_run **run, struct lumi_error *error);
+                  bool alone, struct lumi_run **run, struct lumi_error *error);
 void lumi_run_close(struct lumi_run *run);
 
 /* "<work>/<stage>/<name><extension>"; free with g_free. index < 0: "<work>/<stage>/all<extension>". */
@@ -80,7 +84,8 @@ struct lumi_key;
 void lumi_key_bytes(struct lumi_key *key, const void *data, size_t size);
 void lumi_key_int(struct lumi_key *key, long long value);
 void lumi_key_double(struct lumi_key *key, double value);
-/* The key of another stage's output for image `index` (−1: of its output for all). */
+/* The key of another stage's output for image `index` (−1: of its output for all). Where that is not there, the stage
+ * that asks fails with a line that says which to run first. */
 void lumi_key_input(struct lumi_key *key, const struct lumi_run *run, const char *stage, int index);
 
 /* One stage. The entries are called with indices in [0, run->count). */
@@ -100,9 +105,6 @@ struct lumi_stage {
     int (*make)(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error);
     bool serial;
 };
-
-/* The stages there are, in an order that can be run. NULL-terminated. */
-extern const struct lumi_stage *const lumi_stages[];
 
 /* Runs one stage for images [first, last). Outputs that are there already are skipped; their number goes to *skipped
  * (may be NULL). */

@@ -1,0 +1,151 @@
+/* A run over a capture: its sources, its work directory, its parameters. */
+#include "pipeline/run/key.h"
+#include "pipeline/run/run_priv.h"
+#include "pipeline/run/sources.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <glib.h>
+#include <glib/gstdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+struct lumi_run_private {
+    int lock;         /* the work directory's lock file */
+    GMutex mutex;     /* guards keys */
+    GHashTable *keys; /* "stage/index" → hex key */
+};
+
+void lumi_run_defaults(struct lumi_parameters *parameters)
+{
+    *parameters = (struct lumi_parameters){.geometry_precision = 5,
+                                           .disk_scale = 1,
+                                           .disk_shape = LUMI_DISK_OVAL,
+                                           .kernel = LUMI_KERNEL_LINEAR,
+                                           .quality = 70,
+                                           .cluster_size = 25};
+}
+
+char *lumi_run_path(const struct lumi_run *run, const char *stage, int index, const char *extension)
+{
+    return g_strdup_printf("%s/%s/%s%s", run->work, stage, index < 0 ? "all" : run->sources[index].name, extension);
+}
+
+void lumi_run_remember_key(const struct lumi_run *run, const char *stage, int index, const char *hex)
+{
+    struct lumi_run_private *priv = run->priv;
+
+    g_mutex_lock(&priv->mutex);
+    g_hash_table_replace(priv->keys, g_strdup_printf("%s/%d", stage, index), g_strdup(hex));
+    g_mutex_unlock(&priv->mutex);
+}
+
+bool lumi_run_output_key(const struct lumi_run *run, const char *stage, int index, char *hex)
+{
+    g_autofree char *name = g_strdup_printf("%s/%d", stage, index);
+
+    g_mutex_lock(&run->priv->mutex);
+    const char *known = g_hash_table_lookup(run->priv->keys, name);
+    if (known)
+        g_strlcpy(hex, known, LUMI_KEY_HEX);
+    g_mutex_unlock(&run->priv->mutex);
+    if (known)
+        return true;
+    g_autofree char *path = lumi_run_path(run, stage, index, ".key");
+    if (!lumi_key_load(path, hex))
+        return false;
+    lumi_run_remember_key(run, stage, index, hex);
+    return true;
+}
+
+static void remove_leftovers_in(const char *folder)
+{
+    g_autoptr(GDir) dir = g_dir_open(folder, 0, NULL);
+    const char *name;
+
+    while (dir && (name = g_dir_read_name(dir)))
+        if (strstr(name, ".tmp-")) {
+            g_autofree char *path = g_build_filename(folder, name, NULL);
+            unlink(path);
+        }
+}
+
+/* What a killed run left: temporary files in the stages' folders. */
+static void remove_leftovers(const char *work)
+{
+    g_autoptr(GDir) dir = g_dir_open(work, 0, NULL);
+    const char *name;
+
+    while (dir && (name = g_dir_read_name(dir))) {
+        g_autofree char *folder = g_build_filename(work, name, NULL);
+        if (g_file_test(folder, G_FILE_TEST_IS_DIR))
+            remove_leftovers_in(folder);
+    }
+}
+
+static int lock_work(struct lumi_run *run, bool alone, struct lumi_error *error)
+{
+    g_autofree char *path = g_build_filename(run->work, ".lock", NULL);
+
+    if (g_mkdir_with_parents(run->work, 0777))
+        return lumi_fail_errno(error, run->work, "create");
+    run->priv->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (run->priv->lock < 0)
+        return lumi_fail_errno(error, path, "create");
+    if (flock(run->priv->lock, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB))
+        return lumi_fail(error, LUMI_ERR_BUSY, "%s: another run is at work there", run->work);
+    if (alone)
+        remove_leftovers(run->work);
+    return LUMI_OK;
+}
+
+static char *strip_slashes(const char *path)
+{
+    size_t length = strlen(path);
+
+    while (length > 1 && path[length - 1] == '/')
+        length--;
+    return g_strndup(path, length);
+}
+
+int lumi_run_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
+                  bool alone, struct lumi_run **result, struct lumi_error *error)
+{
+    struct lumi_run *run = g_new0(struct lumi_run, 1);
+    int code;
+
+    *result = NULL;
+    run->priv = g_new0(struct lumi_run_private, 1);
+    run->priv->lock = -1;
+    g_mutex_init(&run->priv->mutex);
+    run->priv->keys = g_hash_table_new_full(g_str_hash, g_str_equal, g_free, g_free);
+    run->capture = strip_slashes(capture);
+    run->work = work ? strip_slashes(work) : g_strconcat(run->capture, ".work", NULL);
+    run->parameters = *parameters;
+    run->threads = threads;
+    LUMI_GOTO(code, fail, lumi_sources_load(run, error));
+    LUMI_GOTO(code, fail, lock_work(run, alone, error));
+    *result = run;
+    return LUMI_OK;
+fail:
+    lumi_run_close(run);
+    return code;
+}
+
+void lumi_run_close(struct lumi_run *run)
+{
+    if (!run)
+        return;
+    for (int i = 0; i < run->count; i++)
+        g_free(run->sources[i].path);
+    g_free(run->sources);
+    if (run->priv->lock >= 0)
+        close(run->priv->lock);
+    g_hash_table_destroy(run->priv->keys);
+    g_mutex_clear(&run->priv->mutex);
+    g_free(run->priv);
+    g_free(run->capture);
+    g_free(run->work);
+    g_free(run);
+}

@@ -1,0 +1,11 @@
+/* The images of a capture as the pipeline sees them. */
+#ifndef LUMI_PIPELINE_RUN_SOURCES_H
+#define LUMI_PIPELINE_RUN_SOURCES_H
+
+#include "pipeline/run/run.h"
+
+/* Fills run->sources and run->count from run->capture: the frames that have a pose and are not rejected, in the order
+ * of the positions. LUMI_ERR_FORMAT if there is none. */
+int lumi_sources_load(struct lumi_run *run, struct lumi_error *error);
+
+#endif
