@@ -25,6 +25,13 @@ if(LUMI_CXX)
   set_tests_properties(house_headers PROPERTIES LABELS house TIMEOUT 300)
 endif()
 
+# Manual and completion against `lumi help`.
+set(manual_work ${CMAKE_CURRENT_BINARY_DIR}/manual)
+file(MAKE_DIRECTORY ${manual_work})
+add_test(NAME house_manual COMMAND bash ${here}/manual.sh $<TARGET_FILE:lumi> ${PROJECT_BINARY_DIR}/manual
+  WORKING_DIRECTORY ${manual_work})
+set_tests_properties(house_manual PROPERTIES LABELS house TIMEOUT 60)
+
 option(LUMI_SANITIZER_TESTS "tests house_asan and house_tsan: build the tree with sanitizers and run its tests" OFF)
 if(LUMI_SANITIZER_TESTS)
   # Memory and undefined behaviour: all but the long and slow tests. Threads: those that use them.
