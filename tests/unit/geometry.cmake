@@ -1,1 +1,2 @@
 lumi_test(test_mesh FOLDERS lightfield base)
+lumi_test(test_equiangular FOLDERS equiangular lightfield base)
