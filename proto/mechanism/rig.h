@@ -90,10 +90,10 @@ struct lumi_rig {
 int lumi_rig_builtin(const char *name, struct lumi_rig *rig, struct lumi_error *error);
 extern const char *const lumi_rig_builtin_names[]; /* NULL-terminated */
 
-/* The same mechanisms in other numbers: an arc of `cameras` evenly spread from pole to pole (none at a pole), on the
- * string with half their spacing a turn where turns > 1; a bar of two cameras, the first from above down to the
- * equator, the second from below up to it, `drop_m` of arc a turn. Equidistant lenses of the given size and field of
- * view. LUMI_ERR_ARG as lumi_rig_check. */
+/* The same mechanisms in other numbers: an arc of `cameras` evenly spread from pole to pole (none at a pole), and where
+ * turns > 1 on the string, falling by their spacing in all turns together; a bar of two cameras, the first from above
+ * down to the equator, the second from below up to it, `drop_m` of arc a turn. Equidistant lenses of the given size and
+ * field of view. LUMI_ERR_ARG as lumi_rig_check. */
 int lumi_rig_arc(struct lumi_rig *rig, int cameras, int positions, int turns, double radius, int width, int height,
                  double fov_x, double fov_y, struct lumi_error *error);
 int lumi_rig_bar(struct lumi_rig *rig, int positions, int turns, double radius, double drop_m, int width, int height,
