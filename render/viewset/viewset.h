@@ -35,10 +35,12 @@ int lumi_viewset_count(const struct lumi_viewset *set);
 const struct lumi_view *lumi_viewset_view(const struct lumi_viewset *set, int view);
 enum lumi_disk_shape lumi_viewset_shape(const struct lumi_viewset *set);
 enum lumi_disk_kernel lumi_viewset_kernel(const struct lumi_viewset *set);
-int lumi_viewset_damaged(const struct lumi_viewset *set);
+int lumi_viewset_damaged(struct lumi_viewset *set);
 
-/* The pixels of a view, RGB (U8 sRGB or F32 linear); valid until released. Decodes on first use. */
-int lumi_viewset_acquire(struct lumi_viewset *set, int view, struct lumi_raster *pixels, struct lumi_error *error);
+/* The pixels of a view, RGB (U8 sRGB or F32 linear); valid until released. Decodes on first use. `missing` (may be
+ * NULL) gets a byte a tile, row by row, not 0 where nothing is known of the tile, or NULL where all is there. */
+int lumi_viewset_acquire(struct lumi_viewset *set, int view, struct lumi_raster *pixels, const uint8_t **missing,
+                         struct lumi_error *error);
 void lumi_viewset_release(struct lumi_viewset *set, int view);
 
 #ifdef __cplusplus
