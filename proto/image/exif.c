@@ -1,11 +1,16 @@
-/* The one thing an EXIF block is asked for: the orientation (Exif 2.32, section 4.6.4 A, tag 0x0112). */
+/* What an EXIF block is asked for: orientation, exposure time, sensitivity (Exif 2.32, sections 4.6.4 and 4.6.5). */
 #include "proto/base/memory.h"
 #include "proto/image/image_priv.h"
 
 #include <string.h>
 
 #define TAG_ORIENTATION 0x0112
+#define TAG_EXIF_DIRECTORY 0x8769
+#define TAG_EXPOSURE_TIME 0x829a
+#define TAG_ISO 0x8827
 #define TYPE_SHORT 3
+#define TYPE_LONG 4
+#define TYPE_RATIONAL 5
 
 struct tiff {
     const uint8_t *data;
@@ -28,24 +33,26 @@ static uint32_t get32(const struct tiff *tiff, size_t at)
     return tiff->big ? first << 16 | second : second << 16 | first;
 }
 
-int image_exif_orientation(const uint8_t *exif, size_t size)
+/* Calls itself once, for the EXIF directory that the first one points to. */
+static void read_directory(const struct tiff *tiff, size_t directory, bool first, struct lumi_image_meta *meta)
 {
-    struct tiff tiff = {exif, size, size > 0 && exif[0] == 'M'};
+    unsigned count = get16(tiff, directory);
 
-    if (size < 8 || (memcmp(exif, "II*\0", 4) != 0 && memcmp(exif, "MM\0*", 4) != 0))
-        return 1;
-    size_t directory = get32(&tiff, 4);
-    unsigned count = get16(&tiff, directory);
     for (unsigned i = 0; i < count; i++) {
         size_t entry = directory + 2 + (size_t)i * 12;
-        if (entry + 12 > size)
+        if (entry + 12 > tiff->size)
             break;
-        if (get16(&tiff, entry) != TAG_ORIENTATION)
-            continue;
-        unsigned value = get16(&tiff, entry + 8);
-        return get16(&tiff, entry + 2) == TYPE_SHORT && value >= 1 && value <= 8 ? (int)value : 1;
+        unsigned tag = get16(tiff, entry), type = get16(tiff, entry + 2), value = get16(tiff, entry + 8);
+        uint32_t at = get32(tiff, entry + 8);
+        if (first && tag == TAG_ORIENTATION && type == TYPE_SHORT && value >= 1 && value <= 8)
+            meta->info.orientation = (int)value;
+        else if (first && tag == TAG_EXIF_DIRECTORY && type == TYPE_LONG)
+            read_directory(tiff, at, false, meta);
+        else if (!first && tag == TAG_EXPOSURE_TIME && type == TYPE_RATIONAL && get32(tiff, (size_t)at + 4) != 0)
+            meta->exposure_s = (double)get32(tiff, at) / get32(tiff, (size_t)at + 4);
+        else if (!first && tag == TAG_ISO && type == TYPE_SHORT)
+            meta->iso = value;
     }
-    return 1;
 }
 
 int image_keep_exif(const struct image_source *source, const void *exif, size_t size, struct lumi_image_meta *meta)
@@ -57,6 +64,8 @@ int image_keep_exif(const struct image_source *source, const void *exif, size_t 
         return lumi_fail(source->error, LUMI_ERR_NOMEM, "%s: no memory for its EXIF block", source->name);
     memcpy(meta->exif, exif, size);
     meta->exif_size = size;
-    meta->info.orientation = image_exif_orientation(exif, size);
+    struct tiff tiff = {meta->exif, size, meta->exif[0] == 'M'};
+    if (size >= 8 && (!memcmp(exif, "II*\0", 4) || !memcmp(exif, "MM\0*", 4)))
+        read_directory(&tiff, get32(&tiff, 4), true, meta);
     return LUMI_OK;
 }

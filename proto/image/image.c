@@ -170,9 +170,8 @@ int lumi_image_info_memory(const void *data, size_t size, const char *name, stru
 }
 
 /* Tries the file's first bytes. False if they do not say it all, or not well: then the whole file decides. */
-static bool info_from_beginning(const char *path, struct lumi_image_info *info)
+static bool meta_from_beginning(const char *path, struct lumi_image_meta *meta)
 {
-    struct lumi_image_meta meta = {0};
     struct stat status;
     bool done = false;
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
@@ -183,27 +182,39 @@ static bool info_from_beginning(const char *path, struct lumi_image_info *info)
     if (data && !fstat(fd, &status) && S_ISREG(status.st_mode)) {
         ssize_t got = read(fd, data, HEADER_BYTES);
         struct image_source source = {data, got > 0 ? (size_t)got : 0, (uint64_t)status.st_size, path, NULL};
-        done = got > 0 && !image_tiff.probe(data, source.size) && read_source(&source, NULL, &meta) == LUMI_OK;
-        if (done)
-            *info = meta.info;
-        lumi_image_meta_finish(&meta);
+        done = got > 0 && !image_tiff.probe(data, source.size) && read_source(&source, NULL, meta) == LUMI_OK;
+        if (!done)
+            lumi_image_meta_finish(meta);
     }
     lumi_free(data);
     close(fd);
     return done;
 }
 
-int lumi_image_info(const char *path, struct lumi_image_info *info, struct lumi_error *error)
+int lumi_image_read_meta(const char *path, struct lumi_image_meta *meta, struct lumi_error *error)
 {
     uint8_t *data;
     size_t size;
 
-    *info = (struct lumi_image_info){0};
-    if (info_from_beginning(path, info))
+    *meta = (struct lumi_image_meta){0};
+    if (meta_from_beginning(path, meta))
         return LUMI_OK;
     LUMI_TRY(lumi_file_read(path, MAX_FILE, &data, &size, error));
-    int code = lumi_image_info_memory(data, size, path, info, error);
+    struct image_source source = {data, size, size, path, error};
+    int code = read_source(&source, NULL, meta);
+    if (code != LUMI_OK)
+        lumi_image_meta_finish(meta);
     lumi_free(data);
+    return code;
+}
+
+int lumi_image_info(const char *path, struct lumi_image_info *info, struct lumi_error *error)
+{
+    struct lumi_image_meta meta;
+    int code = lumi_image_read_meta(path, &meta, error);
+
+    *info = meta.info;
+    lumi_image_meta_finish(&meta);
     return code;
 }
 

@@ -49,6 +49,8 @@ struct lumi_image_meta {
     struct lumi_image_info info;
     uint8_t *exif; /* the EXIF block, beginning with its TIFF header ("II" or "MM"); NULL if there is none; owned */
     size_t exif_size;
+    double exposure_s; /* from the EXIF block, 0 where it does not say */
+    double iso;
 };
 
 void lumi_image_meta_finish(struct lumi_image_meta *meta);
@@ -67,6 +69,9 @@ int lumi_image_info(const char *path, struct lumi_image_info *info, struct lumi_
 int lumi_image_info_memory(const void *data, size_t size, const char *name, struct lumi_image_info *info,
                            struct lumi_error *error);
 
+/* The header with the EXIF block (of a PNG only where it stands before the pixels). */
+int lumi_image_read_meta(const char *path, struct lumi_image_meta *meta, struct lumi_error *error);
+
 /* One named channel of an OpenEXR file ("Z", "W", "B" ...) as a 1-channel F32 raster. LUMI_ERR_NOTFOUND if it has no
  * such channel. */
 int lumi_image_read_channel(const char *path, const char *channel, struct lumi_raster *raster,
@@ -79,7 +84,7 @@ struct lumi_image_options {
     int bits;            /* PNG, TIFF: 8, 16 (TIFF also 32, float); 0: as the raster; F32 in PNG is 16 */
     bool half;           /* OpenEXR: 16-bit floats; false: 32-bit floats */
     const char *channel; /* OpenEXR: name of a 1-channel raster's channel; NULL: "Y" */
-    int level;           /* PNG, OpenEXR, TIFF: deflate level 1..9, 0: a fast one; −1: not compressed */
+    int level;           /* PNG, OpenEXR, TIFF: deflate level 1..9; 0: a fast choice (OpenEXR: PIZ); −1: none */
     bool sync;           /* fsync before the file gets its name */
     const void *exif;    /* EXIF block to embed (JPEG, PNG), as in lumi_image_meta; may be NULL */
     size_t exif_size;

@@ -34,9 +34,7 @@ int image_claim(const struct image_source *source, const struct lumi_image_info 
 /* One channel of an OpenEXR file in memory. */
 int image_exr_channel(const struct image_source *source, const char *channel, struct lumi_raster *raster);
 
-/* EXIF's orientation tag, 1 where there is none or the block makes no sense. */
-int image_exif_orientation(const uint8_t *exif, size_t size);
-/* Copies an EXIF block into meta and takes the orientation from it. */
+/* Copies an EXIF block into meta and takes from it what meta has fields for, as far as the block makes sense. */
 int image_keep_exif(const struct image_source *source, const void *exif, size_t size, struct lumi_image_meta *meta);
 
 #endif
