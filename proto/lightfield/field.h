@@ -7,6 +7,7 @@
 #include "proto/lightfield/disk.h"
 #include "proto/lightfield/grid.h"
 #include "proto/lightfield/mesh.h"
+#include "proto/lightfield/tile_window.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -65,11 +66,6 @@ struct lumi_tile_decoder;
 int lumi_tile_decoder_create(const struct lumi_field *field, struct lumi_tile_decoder **decoder,
                              struct lumi_error *error);
 void lumi_tile_decoder_destroy(struct lumi_tile_decoder *decoder);
-
-/* A decoded tile: 64×64 luma, 32×32 chroma, sRGB 8 bit YUV 4:2:0 BT.709 full range, rows without padding. */
-struct lumi_tile_pixels {
-    uint8_t y[LUMI_TILE * LUMI_TILE], u[LUMI_TILE * LUMI_TILE / 4], v[LUMI_TILE * LUMI_TILE / 4];
-};
 
 /* Decodes tile (column, row) of a view on its own, in any order. LUMI_ERR_CHECKSUM for a damaged one; the decoder stays
  * usable. Tiles of reference images are copied from memory. */
