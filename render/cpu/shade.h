@@ -2,7 +2,7 @@
 #ifndef LUMI_RENDER_CPU_SHADE_H
 #define LUMI_RENDER_CPU_SHADE_H
 
-#include "render/cpu/disks.h"
+#include "render/cpu/disk_renderer.h"
 #include "render/cpu/raster_block.h"
 
 /* Sums over the views, in the layout of the rays. */

@@ -4,8 +4,8 @@
  * the view weighs, where it meets the view's own surface says which of its colours. Works for any arrangement of the
  * views, since a disk is crossed in front of the eye or behind it alike; a view takes part where it faces the way the
  * ray runs. docs/rendering.md tells the rest. */
-#ifndef LUMI_RENDER_CPU_DISKS_H
-#define LUMI_RENDER_CPU_DISKS_H
+#ifndef LUMI_RENDER_CPU_DISK_RENDERER_H
+#define LUMI_RENDER_CPU_DISK_RENDERER_H
 
 #include "render/cpu/picture.h"
 #include "render/viewset/viewset.h"

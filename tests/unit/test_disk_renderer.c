@@ -1,5 +1,5 @@
 /* render/cpu: the disk renderer against scenes whose every ray is known. */
-#include "render/cpu/disks.h"
+#include "render/cpu/disk_renderer.h"
 
 #include "tests/unit/analytic_scene.h"
 

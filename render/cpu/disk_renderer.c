@@ -1,5 +1,5 @@
 /* The reference renderer: views in groups, output blocks in parallel, every pixel's views in the set's order. */
-#include "render/cpu/disks.h"
+#include "render/cpu/disk_renderer.h"
 
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
