@@ -1,0 +1,150 @@
+/* From lens and pose to pixels, tile by tile. */
+#include "sim/camera.h"
+
+#include "proto/base/parallel.h"
+#include "sim/shade.h"
+
+#include <string.h>
+
+#define TILE 32
+#define COARSE 2 /* rays a side of a pixel, everywhere */
+#define FINE 4   /* and where the coarse ones differ */
+
+/* Coarse rays differ when a channel's brightest and darkest, as the eye sees them (about a square root), are further
+ * apart than this. */
+#define CONTRAST 0.035f
+
+struct job {
+    const struct sim_scene *scene;
+    const struct lumi_lens *lens;
+    const struct lumi_pose *pose;
+    struct lumi_raster *color, *depth;
+    int columns; /* of tiles */
+};
+
+/* Directions (world) at the corners of a tile's pixels; between them they are linear to 1e-4 of a pixel. */
+struct corners {
+    struct sim_v3 direction[TILE + 1][TILE + 1];
+    bool imaged[TILE + 1][TILE + 1];
+};
+
+static void find_corners(const struct job *job, int x0, int y0, int width, int height, struct corners *corners)
+{
+    for (int j = 0; j <= height; j++)
+        for (int i = 0; i <= width; i++) {
+            struct lumi_vec3 d = {0};
+            corners->imaged[j][i] = lumi_lens_unproject(job->lens, x0 + i, y0 + j, &d);
+            corners->direction[j][i] = v3_of(lumi_rotate(job->pose->r, d));
+        }
+}
+
+/* The ray through (a, b) in 0..1 of the pixel (i, j) of the tile. */
+static void pixel_ray(const struct job *job, const struct corners *c, int i, int j, float a, float b,
+                      struct sim_ray *ray)
+{
+    struct sim_v3 top = v3_mix(c->direction[j][i], c->direction[j][i + 1], a);
+    struct sim_v3 bottom = v3_mix(c->direction[j + 1][i], c->direction[j + 1][i + 1], a);
+    struct sim_v3 diagonal = v3_sub(c->direction[j + 1][i + 1], c->direction[j][i]);
+
+    ray->origin = v3_of(job->pose->t);
+    ray->direction = v3_unit(v3_mix(top, bottom, b));
+    ray->spread = 0.70710678f * v3_length(diagonal);
+}
+
+struct range {
+    struct sim_v3 sum, low, high;
+};
+
+static void take(struct range *range, struct sim_v3 c)
+{
+    range->sum = v3_add(range->sum, c);
+    range->low = v3(fminf(range->low.x, c.x), fminf(range->low.y, c.y), fminf(range->low.z, c.z));
+    range->high = v3(fmaxf(range->high.x, c.x), fmaxf(range->high.y, c.y), fmaxf(range->high.z, c.z));
+}
+
+static struct range sample_pixel(const struct job *job, const struct corners *corners, int i, int j, int side)
+{
+    struct range range = {v3_grey(0), v3_grey(INFINITY), v3_grey(0)};
+    struct sim_ray ray;
+    struct sim_hit hit;
+
+    for (int k = 0; k < side * side; k++) {
+        float a = ((float)(k % side) + 0.5f) / (float)side, b = ((float)(k / side) + 0.5f) / (float)side;
+        pixel_ray(job, corners, i, j, a, b, &ray);
+        sim_trace(job->scene, &ray, 1e-3f, &hit);
+        /* All sixteen points of the sun in turn; four of them that lie evenly for the coarse rays. */
+        int sun = side == FINE ? k * 7 % SIM_SUN_POINTS : k * 5 % SIM_SUN_POINTS;
+        struct sim_v3 c = sim_shade(job->scene, &ray, &hit, sun);
+        take(&range, c);
+    }
+    range.sum = v3_scale(range.sum, 1 / (float)(side * side));
+    return range;
+}
+
+static bool differs(const struct range *r)
+{
+    return sqrtf(r->high.x) - sqrtf(r->low.x) > CONTRAST || sqrtf(r->high.y) - sqrtf(r->low.y) > CONTRAST ||
+           sqrtf(r->high.z) - sqrtf(r->low.z) > CONTRAST;
+}
+
+static float pixel_depth(const struct job *job, int x, int y)
+{
+    struct lumi_vec3 d;
+    struct sim_hit hit;
+
+    if (!lumi_lens_unproject(job->lens, x + 0.5, y + 0.5, &d))
+        return 0;
+    struct sim_ray ray = {.origin = v3_of(job->pose->t), .direction = v3_of(lumi_rotate(job->pose->r, d))};
+    sim_trace(job->scene, &ray, 1e-3f, &hit);
+    return hit.triangle < 0 ? INFINITY : hit.distance * (float)d.z;
+}
+
+static int render_tile(void *context, int index, int thread)
+{
+    const struct job *job = context;
+    int x0 = index % job->columns * TILE, y0 = index / job->columns * TILE;
+    int width = job->lens->width - x0, height = job->lens->height - y0;
+    struct corners corners;
+
+    (void)thread;
+    width = width < TILE ? width : TILE;
+    height = height < TILE ? height : TILE;
+    find_corners(job, x0, y0, width, height, &corners);
+    for (int j = 0; j < height; j++)
+        for (int i = 0; i < width; i++) {
+            if (job->depth)
+                lumi_row_f32(job->depth, y0 + j)[x0 + i] = pixel_depth(job, x0 + i, y0 + j);
+            if (!corners.imaged[j][i] || !corners.imaged[j][i + 1] || !corners.imaged[j + 1][i] ||
+                !corners.imaged[j + 1][i + 1])
+                continue;
+            struct range range = sample_pixel(job, &corners, i, j, COARSE);
+            if (differs(&range))
+                range = sample_pixel(job, &corners, i, j, FINE);
+            float *to = lumi_row_f32(job->color, y0 + j) + 3 * (size_t)(x0 + i);
+            to[0] = range.sum.x;
+            to[1] = range.sum.y;
+            to[2] = range.sum.z;
+        }
+    return LUMI_OK;
+}
+
+int sim_camera_render(const struct sim_scene *scene, const struct lumi_lens *lens, const struct lumi_pose *pose,
+                      int threads, struct lumi_raster *color, struct lumi_raster *depth, struct lumi_error *error)
+{
+    int columns = (lens->width + TILE - 1) / TILE, rows = (lens->height + TILE - 1) / TILE;
+    struct job job = {scene, lens, pose, color, depth, columns};
+
+    if (depth)
+        *depth = (struct lumi_raster){0};
+    int code = lumi_raster_create(color, lens->width, lens->height, 3, LUMI_F32);
+    if (code == LUMI_OK && depth)
+        code = lumi_raster_create(depth, lens->width, lens->height, 1, LUMI_F32);
+    if (code == LUMI_OK)
+        code = lumi_parallel_for(columns * rows, threads, render_tile, &job);
+    if (code == LUMI_OK)
+        return LUMI_OK;
+    lumi_raster_finish(color);
+    if (depth)
+        lumi_raster_finish(depth);
+    return lumi_fail(error, code, "no memory for a picture of %d x %d", lens->width, lens->height);
+}

@@ -1,0 +1,27 @@
+/* The list of places. */
+#include "sim/place.h"
+
+#include <string.h>
+
+const struct sim_place *const sim_places[] = {&sim_room, NULL};
+
+int sim_place_open(const char *name, struct sim_scene **result, struct lumi_error *error)
+{
+    const struct sim_place *place = NULL;
+    struct sim_scene *scene;
+
+    *result = NULL;
+    for (int i = 0; sim_places[i]; i++)
+        if (!strcmp(sim_places[i]->name, name))
+            place = sim_places[i];
+    if (!place)
+        return lumi_fail(error, LUMI_ERR_ARG, "no place '%s': room, court and object there are", name);
+    LUMI_TRY(sim_scene_create(&scene, error));
+    place->build(scene);
+    int code = sim_scene_commit(scene, error);
+    if (code == LUMI_OK)
+        *result = scene;
+    else
+        sim_scene_destroy(scene);
+    return code;
+}
