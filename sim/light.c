@@ -5,8 +5,7 @@
 #define AREA_POINTS 6 /* a side */
 
 /* What light leaves a point that was hit, towards wherever: its mean colour under the sun and the ambient light. */
-static struct sim_v3 rough_radiance(const struct sim_scene *scene, const struct sim_ray *ray,
-                                    const struct sim_hit *hit)
+static struct sim_v3 rough_radiance(const struct sim_scene *scene, const struct sim_ray *ray, const struct sim_hit *hit)
 {
     if (hit->triangle < 0)
         return sim_sky_radiance(&scene->sky, ray->direction, 0.2f, 0.1f, false);
@@ -104,9 +103,8 @@ struct sim_v3 sim_vertex_light(const struct sim_scene *scene, unsigned vertex)
     _Atomic(float) *store = &scene->light[3 * (size_t)vertex];
 
     if (!atomic_load_explicit(&scene->lit[vertex], memory_order_acquire)) {
-        const float *position = scene->positions[vertex];
-        struct sim_v3 n = scene->vertices[vertex].normal;
-        struct sim_v3 p = v3(position[0], position[1], position[2]), sum = gather(scene, v3_along(p, n, 2e-3f), n);
+        const struct sim_vertex *at = &scene->vertices[vertex];
+        struct sim_v3 sum = gather(scene, v3_along(at->probe, at->normal, 2e-3f), at->normal);
         atomic_store_explicit(&store[0], sum.x, memory_order_relaxed);
         atomic_store_explicit(&store[1], sum.y, memory_order_relaxed);
         atomic_store_explicit(&store[2], sum.z, memory_order_relaxed);

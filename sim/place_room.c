@@ -27,14 +27,14 @@ static void make_covers(struct sim_scene *s, struct shared *m)
     for (int i = 0; i < COVERS; i++) {
         bool light = colors[i].y > 0.3f;
         struct sim_v3 ink = light ? v3(0.12f, 0.06f, 0.04f) : v3(0.75f, 0.6f, 0.3f);
-        m->covers[i] = sim_pattern_material(s, SIM_PRINT, colors[i], ink, ink, 0.010f, 0.022f, 0.16f,
-                                            100u + (unsigned)i);
+        m->covers[i] =
+            sim_pattern_material(s, SIM_PRINT, colors[i], ink, ink, 0.010f, 0.022f, 0.16f, 100u + (unsigned)i);
     }
 }
 
 static void make_shared(struct sim_scene *s, struct shared *m)
 {
-    m->wood = sim_wood(s, v3(0.50f, 0.32f, 0.16f), v3(0.26f, 0.14f, 0.06f), 0.03f, 1);
+    m->wood = sim_wood(s, v3(0.50f, 0.32f, 0.16f), v3(0.26f, 0.14f, 0.06f), 0, 1);
     m->dark_wood = sim_wood(s, v3(0.20f, 0.11f, 0.06f), v3(0.08f, 0.04f, 0.02f), 0, 2);
     m->white = sim_paint(s, v3(0.78f, 0.76f, 0.72f), 0.04f, 3);
     m->black = sim_paint(s, v3(0.03f, 0.03f, 0.035f), 0.10f, 4);
@@ -58,8 +58,8 @@ static void wall_with_window(struct sim_scene *s, struct sim_v3 a, struct sim_v3
                              int material)
 {
     float h = Z1 - Z0;
-    const float part[4][4] = {{0, 0, hole[0], h}, {hole[2], 0, length, h}, {hole[0], 0, hole[2], hole[1]},
-                              {hole[0], hole[3], hole[2], h}};
+    const float part[4][4] = {
+        {0, 0, hole[0], h}, {hole[2], 0, length, h}, {hole[0], 0, hole[2], hole[1]}, {hole[0], hole[3], hole[2], h}};
 
     for (int i = 0; i < 4; i++) {
         const float *p = part[i];
@@ -95,20 +95,33 @@ static void shell(struct sim_scene *s, const struct shared *m)
                                             v3(0.24f, 0.13f, 0.06f), 1.7f, 0.135f, 0.10f, 20);
     int plaster = sim_paint(s, v3(0.66f, 0.60f, 0.50f), 0.06f, 21);
     int ceiling = sim_paint(s, v3(0.80f, 0.79f, 0.76f), 0.025f, 22);
-    int wallpaper = sim_pattern_material(s, SIM_WALLPAPER, v3(0.30f, 0.40f, 0.40f), v3(0.52f, 0.56f, 0.48f),
-                                         v3_grey(0), 0.21f, 0.17f, 0.10f, 23);
+    int wallpaper = sim_pattern_material(s, SIM_WALLPAPER, v3(0.30f, 0.40f, 0.40f), v3(0.52f, 0.56f, 0.48f), v3_grey(0),
+                                         0.21f, 0.17f, 0.10f, 23);
     int brick = sim_pattern_material(s, SIM_BRICK, v3(0.46f, 0.17f, 0.10f), v3(0.52f, 0.49f, 0.44f),
                                      v3(0.32f, 0.14f, 0.10f), 0.24f, 0.075f, 0.22f, 24);
     int blue = sim_paint(s, v3(0.28f, 0.34f, 0.42f), 0.09f, 25);
     float lx = X1 - X0, ly = Y1 - Y0;
 
-    s->materials[floor_boards].reflectance = 0.03f;
-    s->materials[floor_boards].roughness = 0.06f;
     sim_quad(s, v3(X0, Y0, Z0), v3(lx, 0, 0), v3(0, ly, 0), GRID, floor_boards);
     sim_quad(s, v3(X0, Y1, Z1), v3(lx, 0, 0), v3(0, -ly, 0), GRID, ceiling);
     for (int i = 0; i < 5; i++)
         sim_box(s, v3(X0 + 0.7f + 1.4f * (float)i, Y0, Z1 - 0.14f), v3(X0 + 0.82f + 1.4f * (float)i, Y1, Z1), 0.1f,
                 m->dark_wood);
+    /* Roof lights of frosted glass between the beams. */
+    struct sim_material frosted;
+    sim_material_init(&frosted);
+    frosted.emission = v3(2.6f, 2.7f, 2.8f);
+    int glass = sim_scene_material(s, &frosted);
+    const float roof[2][4] = {{-0.62f, 0.3f, 0.52f, 1.9f}, {0.82f, -2.3f, 1.9f, -0.7f}};
+    for (int i = 0; i < 2; i++) {
+        const float *r = roof[i], t = 0.04f;
+        sim_quad(s, v3(r[0], r[3], Z1 - 0.01f), v3(r[2] - r[0], 0, 0), v3(0, r[1] - r[3], 0), GRID, glass);
+        sim_scene_light(s, v3(r[0], r[3], Z1 - 0.01f), v3(r[2] - r[0], 0, 0), v3(0, r[1] - r[3], 0));
+        sim_box(s, v3(r[0] - t, r[1] - t, Z1 - 0.04f), v3(r[2] + t, r[1], Z1), 0.1f, m->white);
+        sim_box(s, v3(r[0] - t, r[3], Z1 - 0.04f), v3(r[2] + t, r[3] + t, Z1), 0.1f, m->white);
+        sim_box(s, v3(r[0] - t, r[1], Z1 - 0.04f), v3(r[0], r[3], Z1), 0.1f, m->white);
+        sim_box(s, v3(r[2], r[1], Z1 - 0.04f), v3(r[2] + t, r[3], Z1), 0.1f, m->white);
+    }
     const float hole_y[4] = {4.0f, 0.85f, 5.7f, 2.25f}; /* along +x from X0: 1.1 … 2.8 */
     const float hole_x[4] = {1.6f, 0.75f, 3.5f, 2.3f};  /* along −y from Y1: 1.8 … −0.1 */
     wall_with_window(s, v3(X0, Y1, Z0), v3(1, 0, 0), lx, hole_y, wallpaper);
@@ -139,7 +152,8 @@ static void outside(struct sim_scene *s, const struct shared *m)
     sim_quad(s, v3(X1 + 0.3f, -60, Z0 - 0.6f), v3(60, 0, 0), v3(0, 63, 0), 2.5f, lawn);
     sim_box(s, v3(-12, 17, Z0 - 0.6f), v3(30, 17.4f, Z0 + 0.9f), 0.5f, wall);
     sim_box(s, v3(22, -22, Z0 - 0.6f), v3(22.4f, 17, Z0 + 0.9f), 0.5f, wall);
-    const float trees[][3] = {{3.5f, 10, 4.4f}, {8, 14, 5.5f}, {-1, 15, 5}, {13, 3, 5}, {17, -4, 6}, {10.5f, -2.5f, 3.6f}};
+    const float trees[][3] = {{3.5f, 10, 4.4f}, {8, 14, 5.5f}, {-1, 15, 5},
+                              {13, 3, 5},       {17, -4, 6},   {10.5f, -2.5f, 3.6f}};
     for (int i = 0; i < 6; i++) {
         sim_scene_place(s, v3(trees[i][0], trees[i][1], Z0 - 0.6f), 50.0f * (float)i, 1);
         sim_tree(s, trees[i][2], 0.3f * trees[i][2], 1500, bark, m->leaf, 40u + (unsigned)i);
@@ -242,8 +256,11 @@ static void around(struct sim_scene *s, const struct shared *m)
 static void walls(struct sim_scene *s, const struct shared *m)
 {
     static const float sizes[5][4] = {/* x, z, width, height on the wall y = Y1 */
-                                      {-2.2f, 0.45f, 0.5f, 0.65f}, {-1.45f, 0.62f, 0.6f, 0.42f}, {-1.4f, 0.08f, 0.42f, 0.42f},
-                                      {-0.55f, 0.40f, 0.75f, 0.55f}, {0.3f, 0.55f, 0.34f, 0.46f}};
+                                      {-2.2f, 0.45f, 0.5f, 0.65f},
+                                      {-1.45f, 0.62f, 0.6f, 0.42f},
+                                      {-1.4f, 0.08f, 0.42f, 0.42f},
+                                      {-0.55f, 0.40f, 0.75f, 0.55f},
+                                      {0.3f, 0.55f, 0.34f, 0.46f}};
     int mirror = sim_metal(s, v3(0.90f, 0.92f, 0.91f), 0);
 
     for (int i = 0; i < 5; i++) {
@@ -262,8 +279,8 @@ static void walls(struct sim_scene *s, const struct shared *m)
     sim_scene_place(s, v3(0.55f, Y0, 0.1f), 180, 1);
     sim_framed(s, 0.8f, 1.2f, 0.05f, m->brass, mirror);
     /* A poster on the bricks, with print. */
-    int poster = sim_pattern_material(s, SIM_PRINT, v3(0.76f, 0.70f, 0.54f), v3(0.10f, 0.12f, 0.22f), v3_grey(0), 0.035f,
-                                      0.075f, 0.08f, 105);
+    int poster = sim_pattern_material(s, SIM_PRINT, v3(0.76f, 0.70f, 0.54f), v3(0.10f, 0.12f, 0.22f), v3_grey(0),
+                                      0.035f, 0.075f, 0.08f, 105);
     sim_scene_place(s, v3(X0, 0.3f, 0.2f), 90, 1);
     sim_framed(s, 0.7f, 1.0f, 0.02f, m->black, poster);
     sim_scene_place(s, v3(0, 0, 0), 0, 1);
@@ -306,14 +323,14 @@ static void build(struct sim_scene *s)
     struct shared m;
 
     s->indoors = true;
-    s->sky = (struct sim_sky){.zenith = {0.75f, 1.15f, 2.0f},
-                              .horizon = {1.9f, 2.1f, 2.3f},
+    s->sky = (struct sim_sky){.zenith = {0.55f, 0.85f, 1.5f},
+                              .horizon = {1.25f, 1.4f, 1.55f},
                               .ground = {0.25f, 0.25f, 0.2f},
                               .clouds = 0.4f,
                               .sun_direction = v3_unit(v3(0.80f, 0.12f, 0.52f)),
                               .sun = {2.6f, 2.35f, 1.95f},
                               .sun_radius = 0.006f,
-                              .ambient = {0.16f, 0.155f, 0.15f},
+                              .ambient = {0.34f, 0.33f, 0.31f},
                               .seed = 9};
     make_shared(s, &m);
     shell(s, &m);

@@ -89,8 +89,8 @@ unsigned sim_scene_vertex(struct sim_scene *scene, struct sim_v3 position, struc
     /* Embree reads 16 bytes at each vertex, so the fourth float is there. */
     void *positions = scene->positions, *vertices = scene->vertices;
     if (scene->vertex_count == scene->vertex_room) {
-        bool grown = grow(scene, &positions, sizeof *scene->positions, &vertices, sizeof *scene->vertices,
-                          &scene->vertex_room);
+        bool grown =
+            grow(scene, &positions, sizeof *scene->positions, &vertices, sizeof *scene->vertices, &scene->vertex_room);
         scene->positions = positions;
         scene->vertices = vertices;
         if (!grown)
@@ -102,8 +102,14 @@ unsigned sim_scene_vertex(struct sim_scene *scene, struct sim_v3 position, struc
     to[1] = p.y;
     to[2] = p.z;
     to[3] = 0;
-    scene->vertices[scene->vertex_count] = (struct sim_vertex){n, at};
+    scene->vertices[scene->vertex_count] = (struct sim_vertex){n, at, p};
     return (unsigned)scene->vertex_count++;
+}
+
+void sim_scene_probe(struct sim_scene *scene, unsigned vertex, struct sim_v3 local)
+{
+    if (!scene->failed)
+        scene->vertices[vertex].probe = sim_scene_point(scene, local);
 }
 
 void sim_scene_triangle(struct sim_scene *scene, unsigned a, unsigned b, unsigned c, int material)
@@ -133,8 +139,7 @@ static int build_tree(struct sim_scene *scene, struct lumi_error *error)
 {
     scene->device = rtcNewDevice(NULL);
     if (!scene->device)
-        return lumi_fail(error, LUMI_ERR_INTERNAL, "Embree cannot be started (error %d)",
-                         (int)rtcGetDeviceError(NULL));
+        return lumi_fail(error, LUMI_ERR_INTERNAL, "Embree cannot be started (error %d)", (int)rtcGetDeviceError(NULL));
     RTCGeometry mesh = rtcNewGeometry(scene->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, scene->positions, 0,
                                sizeof *scene->positions, scene->vertex_count);

@@ -1,8 +1,8 @@
 /* A place as the ray tracer sees it: triangles with materials, lights, a sky.
  *
- * 1. All geometry is one mesh of triangles. A vertex has a normal, surface coordinates (metres) and, once a ray has come
- *    near it, the indirect light that falls on it: computed when first asked for, a function of the scene alone, so that
- *    neither the order nor the number of threads matters.
+ * 1. All geometry is one mesh of triangles. A vertex has a normal, surface coordinates (metres) and, once a ray has
+ * come near it, the indirect light that falls on it: computed when first asked for, a function of the scene alone, so
+ * that neither the order nor the number of threads matters.
  * 2. Light is split three ways: the sun (a ray from every point that is seen), lights of an area (windows, lamps: fixed
  *    points on them, at the vertices) and the rest (fixed directions, at the vertices).
  * 3. World: metres, +Z up, the rig's centre in the origin. */
@@ -35,6 +35,7 @@ struct sim_sky {
 
 struct sim_vertex {
     struct sim_v3 normal, at;
+    struct sim_v3 probe; /* where its light is measured: its place, but for corners where faces meet */
 };
 
 struct sim_triangle {
@@ -79,6 +80,8 @@ void sim_scene_place(struct sim_scene *scene, struct sim_v3 origin, float yaw, f
 void sim_scene_place_frame(struct sim_scene *scene, const struct sim_frame *frame);
 
 unsigned sim_scene_vertex(struct sim_scene *scene, struct sim_v3 position, struct sim_v3 normal, struct sim_v3 at);
+/* Measures the light of a vertex there instead: a little inside the face that the vertex bounds. */
+void sim_scene_probe(struct sim_scene *scene, unsigned vertex, struct sim_v3 local);
 void sim_scene_triangle(struct sim_scene *scene, unsigned a, unsigned b, unsigned c, int material);
 struct sim_v3 sim_scene_point(const struct sim_scene *scene, struct sim_v3 local);
 void sim_scene_light(struct sim_scene *scene, struct sim_v3 origin, struct sim_v3 u, struct sim_v3 v);

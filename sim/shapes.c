@@ -22,12 +22,16 @@ void sim_quad_at(struct sim_scene *scene, struct sim_v3 origin, struct sim_v3 u,
     int rows = (int)sim_clamp(ceilf(lv * scale / grid), 1, 400);
     struct sim_v3 normal = v3_unit(v3_cross(u, v));
     unsigned first = (unsigned)scene->vertex_count;
+    /* Where a wall meets a ceiling, light is measured short of the corner, lest it come from behind the other. */
+    float edge_u = fminf(0.015f / (lu * scale), 0.3f), edge_v = fminf(0.015f / (lv * scale), 0.3f);
 
     for (int j = 0; j <= rows; j++)
         for (int i = 0; i <= columns; i++) {
             float a = (float)i / (float)columns, b = (float)j / (float)rows;
             struct sim_v3 p = v3_along(v3_along(origin, u, a), v, b);
-            sim_scene_vertex(scene, p, normal, v3(offset_u + a * lu, offset_v + b * lv, 0));
+            unsigned vertex = sim_scene_vertex(scene, p, normal, v3(offset_u + a * lu, offset_v + b * lv, 0));
+            float ia = sim_clamp(a, edge_u, 1 - edge_u), ib = sim_clamp(b, edge_v, 1 - edge_v);
+            sim_scene_probe(scene, vertex, v3_along(v3_along(origin, u, ia), v, ib));
         }
     stitch(scene, first, rows, columns, material);
 }
@@ -131,7 +135,8 @@ void sim_lump(struct sim_scene *scene, struct sim_v3 center, struct sim_v3 r, fl
 
     for (int j = 0; j <= rows; j++)
         for (int i = 0; i <= columns; i++) {
-            float latitude = pi * ((float)j / (float)rows - 0.5f), longitude = 2 * pi * (float)(i % columns) / (float)columns;
+            float latitude = pi * ((float)j / (float)rows - 0.5f),
+                  longitude = 2 * pi * (float)(i % columns) / (float)columns;
             struct sim_v3 n = v3(cosf(latitude) * cosf(longitude), cosf(latitude) * sinf(longitude), sinf(latitude));
             float push = 1 + bumps * sim_noise3(v3_add(v3_scale(n, 1.7f), v3_scale(center, 3)), 77);
             struct sim_v3 p = v3_mul(v3_scale(n, push), r);

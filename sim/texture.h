@@ -1,8 +1,8 @@
 /* Surfaces: procedural, with a natural spectrum, and filtered to the size a pixel has on them.
  *
- * 1. Fractal noise: octaves of gradient noise of (almost) equal strength, so that the amplitude of a picture of it falls
- *    with one over the spatial frequency, as in photographs (Field, "Relations between the statistics of natural images
- *    and the response properties of cortical cells", 1987).
+ * 1. Fractal noise: octaves of gradient noise of (almost) equal strength, so that the amplitude of a picture of it
+ * falls with one over the spatial frequency, as in photographs (Field, "Relations between the statistics of natural
+ * images and the response properties of cortical cells", 1987).
  * 2. An octave fades out while its wavelength falls from two footprints to one; edges of patterns are as wide as the
  *    footprint; a pattern finer than the footprint is replaced by its mean.
  * 3. A texture is a function of the surface's own coordinates (metres) and of the footprint, of nothing else. */

@@ -140,8 +140,8 @@ void sim_bookcase(struct sim_scene *s, float w, float h, int shelves, int wood, 
 
 void sim_plant(struct sim_scene *s, int leaves, float size, int pot, int leaf, unsigned seed)
 {
-    const float side[][2] = {{0.001f, 0}, {0.085f, 0}, {0.10f, 0.08f}, {0.12f, 0.20f}, {0.11f, 0.205f}, {0.10f, 0.18f},
-                             {0.001f, 0.175f}};
+    const float side[][2] = {{0.001f, 0},     {0.085f, 0},    {0.10f, 0.08f},  {0.12f, 0.20f},
+                             {0.11f, 0.205f}, {0.10f, 0.18f}, {0.001f, 0.175f}};
 
     sim_lathe(s, v3(0, 0, 0), side, 7, 28, pot);
     for (int i = 0; i < leaves; i++) {
@@ -220,17 +220,24 @@ void sim_ladder(struct sim_scene *s, float width, float height, int wood)
 void sim_vase(struct sim_scene *s, float height, int material)
 {
     float h = height;
-    const float side[][2] = {{0.001f, 0},          {0.16f * h, 0.005f * h}, {0.24f * h, 0.2f * h},  {0.27f * h, 0.42f * h},
-                             {0.17f * h, 0.7f * h}, {0.09f * h, 0.86f * h},  {0.13f * h, 1.0f * h}, {0.115f * h, 0.99f * h},
-                             {0.07f * h, 0.86f * h}, {0.001f, 0.7f * h}};
+    const float side[][2] = {{0.001f, 0},
+                             {0.16f * h, 0.005f * h},
+                             {0.24f * h, 0.2f * h},
+                             {0.27f * h, 0.42f * h},
+                             {0.17f * h, 0.7f * h},
+                             {0.09f * h, 0.86f * h},
+                             {0.13f * h, 1.0f * h},
+                             {0.115f * h, 0.99f * h},
+                             {0.07f * h, 0.86f * h},
+                             {0.001f, 0.7f * h}};
 
     sim_lathe(s, v3(0, 0, 0), side, 10, 40, material);
 }
 
 void sim_mug(struct sim_scene *s, int material)
 {
-    const float side[][2] = {{0.001f, 0}, {0.036f, 0.001f}, {0.04f, 0.01f}, {0.041f, 0.05f}, {0.041f, 0.094f},
-                             {0.037f, 0.094f}, {0.036f, 0.05f}, {0.034f, 0.012f}, {0.001f, 0.01f}};
+    const float side[][2] = {{0.001f, 0},      {0.036f, 0.001f}, {0.04f, 0.01f},   {0.041f, 0.05f}, {0.041f, 0.094f},
+                             {0.037f, 0.094f}, {0.036f, 0.05f},  {0.034f, 0.012f}, {0.001f, 0.01f}};
     struct sim_v3 points[13];
 
     sim_lathe(s, v3(0, 0, 0), side, 9, 36, material);
@@ -243,8 +250,9 @@ void sim_mug(struct sim_scene *s, int material)
 
 void sim_bowl(struct sim_scene *s, float r, int material, const int *fruit, int fruit_count)
 {
-    const float side[][2] = {{0.001f, 0},           {0.45f * r, 0.002f},   {0.8f * r, 0.25f * r}, {r, 0.55f * r},
-                             {0.96f * r, 0.55f * r}, {0.72f * r, 0.25f * r}, {0.001f, 0.08f * r}};
+    const float side[][2] = {{0.001f, 0},        {0.45f * r, 0.002f},    {0.8f * r, 0.25f * r},
+                             {r, 0.55f * r},     {0.96f * r, 0.55f * r}, {0.72f * r, 0.25f * r},
+                             {0.001f, 0.08f * r}};
 
     sim_lathe(s, v3(0, 0, 0), side, 7, 40, material);
     for (int i = 0; i < 7; i++) {

@@ -1,0 +1,115 @@
+/* lumi sim truth: views of a simulated place with poses and depth, to judge by. */
+#include "cli/command.h"
+#include "sim/place.h"
+#include "sim/truth.h"
+
+static char *out, *rig_text, *size_text, *format_text, *lens_text;
+static int random_count, seed = 1, threads;
+static double fov, scale = 1, volume;
+static gboolean no_depth, inward;
+
+static const GOptionEntry options[] = {
+    {"output", 'o', 0, G_OPTION_ARG_FILENAME, &out, "folder for transforms.json, images and depth", "DIR"},
+    {"rig", 0, 0, G_OPTION_ARG_STRING, &rig_text,
+     "arc16, arc16x2, bar2, planar:ROWSxCOLS:SPACING or sphere:ROWSxCOLS:RADIUS (metres): its views, or with --random "
+     "the "
+     "volume they are in",
+     "RIG"},
+    {"random", 0, 0, G_OPTION_ARG_INT, &random_count, "so many views from places inside the rig's volume", "N"},
+    {"seed", 0, 0, G_OPTION_ARG_INT, &seed, "of the random views (1)", "S"},
+    {"volume", 0, 0, G_OPTION_ARG_DOUBLE, &volume, "radius in metres within which random eyes are (0.6 of the rig's)",
+     "R"},
+    {"fov", 0, 0, G_OPTION_ARG_DOUBLE, &fov, "horizontal field of view in degrees", "DEGREES"},
+    {"size", 0, 0, G_OPTION_ARG_STRING, &size_text, "size of the views in pixels", "WxH"},
+    {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale, "shrinks a rig's counts and resolution (1)", "S"},
+    {"lens", 0, 0, G_OPTION_ARG_STRING, &lens_text, "pinhole, brown or fisheye, for planar and sphere", "LENS"},
+    {"inward", 0, 0, G_OPTION_ARG_NONE, &inward, "a sphere's cameras look at its centre", NULL},
+    {"format", 0, 0, G_OPTION_ARG_STRING, &format_text, "png, jpeg or exr (linear light)", "FORMAT"},
+    {"no-depth", 0, 0, G_OPTION_ARG_NONE, &no_depth, "no depth maps", NULL},
+    {"threads", 'j', 0, G_OPTION_ARG_INT, &threads, "threads (all)", "N"},
+    {0},
+};
+
+static void progress(void *context, int done, int total)
+{
+    cli_progress(context, done, total);
+}
+
+static int choose_views(struct sim_rig *views, struct lumi_error *error)
+{
+    static const char *const lenses[] = {"default", "pinhole", "brown", "fisheye", NULL};
+    struct sim_rig_options rig_options;
+    int size[2] = {0, 0}, lens = 0;
+
+    sim_rig_options_init(&rig_options);
+    if (size_text)
+        LUMI_TRY(cli_parse_ints("--size", size_text, 'x', 2, size, error));
+    if (lens_text)
+        LUMI_TRY(cli_parse_choice("--lens", lens_text, lenses, &lens, error));
+    rig_options.scale = scale;
+    rig_options.lens = (enum sim_lens_kind)lens;
+    rig_options.inward = inward;
+    if (!random_count) {
+        rig_options.width = size[0];
+        rig_options.height = size[1];
+        rig_options.fov = fov;
+        return sim_rig_init(views, rig_text, &rig_options, error);
+    }
+    struct sim_rig around;
+    LUMI_TRY(sim_rig_init(&around, rig_text, &rig_options, error));
+    struct sim_random_options random = {.count = random_count,
+                                        .width = size[0] ? size[0] : 640,
+                                        .height = size[1] ? size[1] : 480,
+                                        .fov = fov > 0         ? fov
+                                               : around.plane  ? 50
+                                               : around.inward ? 40
+                                                               : 75,
+                                        .volume = volume,
+                                        .seed = (uint64_t)seed};
+    int code = sim_rig_random(&around, &random, views, error);
+    sim_rig_finish(&around);
+    return code;
+}
+
+static int run(int argc, char **argv, struct lumi_error *error)
+{
+    static const char *const formats[] = {"png", "jpeg", "exr", NULL};
+    struct sim_scene *scene = NULL;
+    struct sim_rig views = {0};
+    struct sim_output output;
+    int format = 0, code;
+
+    (void)argc;
+    if (!out)
+        return lumi_fail(error, LUMI_ERR_ARG, "-o DIR is missing");
+    if (!rig_text)
+        rig_text = (char *)"arc16";
+    sim_output_init(&output);
+    if (format_text)
+        LUMI_TRY(cli_parse_choice("--format", format_text, formats, &format, error));
+    output.format = (enum sim_format)format;
+    output.depth = !no_depth;
+    output.threads = threads;
+    output.progress = progress;
+    output.context = argv[0];
+    LUMI_GOTO(code, done, choose_views(&views, error));
+    LUMI_GOTO(code, done, sim_place_open(argv[0], &scene, error));
+    LUMI_GOTO(code, done, sim_truth_write(scene, &views, &output, out, error));
+done:
+    sim_scene_destroy(scene);
+    sim_rig_finish(&views);
+    return code;
+}
+
+const struct cli_command cli_sim_truth = {
+    .name = "sim truth",
+    .arguments = "PLACE -o DIR",
+    .summary = "views of a simulated place with true poses and depth",
+    .description =
+        "Writes DIR/transforms.json (nerfstudio's convention), DIR/images and DIR/depth (OpenEXR, channel Z, "
+        "metres along the optical axis): every view of a rig, or --random N views from inside its volume.",
+    .options = options,
+    .min_arguments = 1,
+    .max_arguments = 1,
+    .run = run,
+};

@@ -1,0 +1,164 @@
+/* Views, poses and depth into a folder. */
+#include "sim/truth.h"
+
+#include "proto/base/file.h"
+#include "proto/base/memory.h"
+#include "proto/image/image.h"
+#include "sim/camera.h"
+
+#include <errno.h>
+#include <glib.h>
+#include <glib/gstdio.h>
+
+void sim_output_init(struct sim_output *output)
+{
+    *output = (struct sim_output){.format = SIM_FORMAT_PNG};
+    sim_sensor_init(&output->sensor);
+}
+
+const char *sim_format_extension(enum sim_format format)
+{
+    return format == SIM_FORMAT_JPEG ? ".jpg" : format == SIM_FORMAT_EXR ? ".exr" : ".png";
+}
+
+static void image_options(const struct sim_output *output, struct lumi_image_options *options)
+{
+    lumi_image_options_init(options);
+    options->format = output->format == SIM_FORMAT_JPEG  ? LUMI_IMAGE_JPEG
+                      : output->format == SIM_FORMAT_EXR ? LUMI_IMAGE_EXR
+                                                         : LUMI_IMAGE_PNG;
+    options->quality = 97;
+    options->bits = output->sensor.bits > 8 ? 16 : 8;
+    options->half = false;
+}
+
+static int write_depth(const char *path, const struct lumi_raster *depth, struct lumi_error *error)
+{
+    struct lumi_image_options options;
+
+    lumi_image_options_init(&options);
+    options.format = LUMI_IMAGE_EXR;
+    options.half = false;
+    options.channel = "Z";
+    return lumi_image_write(path, depth, &options, error);
+}
+
+int sim_view_encode(const struct sim_scene *scene, const struct sim_view *view, int index,
+                    const struct sim_output *output, const char *depth_path, uint8_t **data, size_t *size,
+                    struct lumi_error *error)
+{
+    struct lumi_raster color = {0}, depth = {0}, coded = {0};
+    struct lumi_image_options options;
+    int code;
+
+    image_options(output, &options);
+    LUMI_GOTO(
+        code, done,
+        sim_camera_render(scene, &view->lens, &view->pose, output->threads, &color, depth_path ? &depth : NULL, error));
+    sim_sensor_apply(&output->sensor, (uint64_t)index, &color);
+    if (depth_path)
+        LUMI_GOTO(code, done, write_depth(depth_path, &depth, error));
+    if (output->format == SIM_FORMAT_EXR) {
+        LUMI_GOTO(code, done, lumi_image_encode(&color, &options, data, size, error));
+    } else {
+        code = lumi_raster_convert(&color, options.bits == 16 && options.format == LUMI_IMAGE_PNG ? LUMI_U16 : LUMI_U8,
+                                   &coded);
+        if (code != LUMI_OK) {
+            lumi_fail(error, code, "no memory for a picture");
+            goto done;
+        }
+        LUMI_GOTO(code, done, lumi_image_encode(&coded, &options, data, size, error));
+    }
+done:
+    lumi_raster_finish(&color);
+    lumi_raster_finish(&depth);
+    lumi_raster_finish(&coded);
+    return code;
+}
+
+/* A number in JSON, whatever the locale, exact. */
+static void number(GString *json, const char *key, double value)
+{
+    char text[G_ASCII_DTOSTR_BUF_SIZE];
+
+    g_string_append_printf(json, "\"%s\": %s", key, g_ascii_dtostr(text, sizeof text, value));
+}
+
+static void append_lens(GString *json, const struct lumi_lens *l)
+{
+    bool fisheye = l->model == LUMI_LENS_FISHEYE;
+    const char *const keys[] = {"fl_x", "fl_y", "cx", "cy", "k1", "k2", fisheye ? "k3" : "p1", fisheye ? "k4" : "p2"};
+    const double values[] = {
+        l->fx, l->fy, l->cx, l->cy, l->k1, l->k2, fisheye ? l->k3 : l->p1, fisheye ? l->k4 : l->p2};
+
+    g_string_append_printf(json, "\"camera_model\": \"%s\", \"w\": %d, \"h\": %d",
+                           fisheye ? "OPENCV_FISHEYE" : "OPENCV", l->width, l->height);
+    for (int i = 0; i < 8; i++) {
+        g_string_append(json, ", ");
+        number(json, keys[i], values[i]);
+    }
+}
+
+static void append_frame(GString *json, const struct sim_view *view, const char *name, const struct sim_output *output)
+{
+    const double *r = view->pose.r;
+    const double t[3] = {view->pose.t.x, view->pose.t.y, view->pose.t.z};
+
+    g_string_append_printf(json, "    {\"file_path\": \"images/%s%s\", ", name, sim_format_extension(output->format));
+    if (output->depth)
+        g_string_append_printf(json, "\"depth_file_path\": \"depth/%s.exr\", ", name);
+    append_lens(json, &view->lens);
+    g_string_append_printf(json, ", \"row\": %d, \"col\": %d,\n     \"transform_matrix\": [", view->row, view->column);
+    for (int i = 0; i < 3; i++) {
+        /* From y down, z forward to y up, z backward. */
+        const double row[4] = {r[3 * i], -r[3 * i + 1], -r[3 * i + 2], t[i]};
+        for (int k = 0; k < 4; k++) {
+            char text[G_ASCII_DTOSTR_BUF_SIZE];
+            g_string_append_printf(json, "%s%s", k ? ", " : "[", g_ascii_dtostr(text, sizeof text, row[k] + 0.0));
+        }
+        g_string_append(json, "], ");
+    }
+    g_string_append(json, "[0, 0, 0, 1]]}");
+}
+
+static int make_folder(const char *path, struct lumi_error *error)
+{
+    if (g_mkdir_with_parents(path, 0777) == 0)
+        return LUMI_OK;
+    return lumi_fail_errno(error, path, "cannot make the folder");
+}
+
+int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,
+                    const char *dir, struct lumi_error *error)
+{
+    g_autofree char *images = g_build_filename(dir, "images", NULL), *depths = g_build_filename(dir, "depth", NULL);
+    g_autofree char *poses = g_build_filename(dir, "transforms.json", NULL);
+    g_autoptr(GString) json = g_string_new("{\"frames\": [\n");
+
+    if (!output->overwrite && g_file_test(poses, G_FILE_TEST_EXISTS))
+        return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", poses);
+    LUMI_TRY(sim_sensor_check(&output->sensor, error));
+    LUMI_TRY(make_folder(images, error));
+    if (output->depth)
+        LUMI_TRY(make_folder(depths, error));
+    for (int i = 0; i < views->count; i++) {
+        const struct sim_view *view = &views->views[i];
+        g_autofree char *name =
+            views->rows > 1 ? g_strdup_printf("r%02dc%02d", view->row, view->column) : g_strdup_printf("v%04d", i);
+        g_autofree char *path = g_strconcat(images, "/", name, sim_format_extension(output->format), NULL);
+        g_autofree char *depth = output->depth ? g_strconcat(depths, "/", name, ".exr", NULL) : NULL;
+        uint8_t *data = NULL;
+        size_t size = 0;
+        int code = sim_view_encode(scene, view, i, output, depth, &data, &size, error);
+        if (code == LUMI_OK)
+            code = lumi_file_write(path, data, size, false, error);
+        lumi_free(data);
+        LUMI_TRY(code);
+        append_frame(json, view, name, output);
+        g_string_append(json, i + 1 < views->count ? ",\n" : "\n");
+        if (output->progress)
+            output->progress(output->context, i + 1, views->count);
+    }
+    g_string_append(json, "]}\n");
+    return lumi_file_write(poses, json->str, json->len, false, error);
+}

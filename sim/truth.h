@@ -1,0 +1,42 @@
+/* Views with their poses and depth, in a folder: what pictures made some other way are judged by.
+ *
+ * DIR/transforms.json (nerfstudio's convention: camera to world, x right, y up, z backward), DIR/images/NAME.png, and
+ * DIR/depth/NAME.exr: one float channel Z, metres along the optical axis, infinite where there is only sky. */
+#ifndef LUMI_SIM_TRUTH_H
+#define LUMI_SIM_TRUTH_H
+
+#include "sim/rigs.h"
+#include "sim/scene.h"
+#include "sim/sensor.h"
+
+#include <stdbool.h>
+
+enum sim_format { SIM_FORMAT_PNG, SIM_FORMAT_JPEG, SIM_FORMAT_EXR };
+
+typedef void (*sim_progress_fn)(void *context, int done, int total);
+
+struct sim_output {
+    enum sim_format format;
+    struct sim_sensor sensor;
+    int threads;           /* 0: as many as there are */
+    const char *depth_dir; /* where depth maps go; NULL: none (truth: its own folder when `depth` is set) */
+    bool depth;
+    bool overwrite; /* truth: into a folder that exists */
+    sim_progress_fn progress;
+    void *context;
+};
+void sim_output_init(struct sim_output *output);
+
+/* Renders all of `views` into the folder `dir`, transforms.json last. */
+int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,
+                    const char *dir, struct lumi_error *error);
+
+/* One view as the bytes of a picture file; `index` is the frame's number for the sensor. Release *data with lumi_free.
+ * If depth_path is not NULL the depth map is written there. */
+int sim_view_encode(const struct sim_scene *scene, const struct sim_view *view, int index,
+                    const struct sim_output *output, const char *depth_path, uint8_t **data, size_t *size,
+                    struct lumi_error *error);
+
+const char *sim_format_extension(enum sim_format format);
+
+#endif
