@@ -1,0 +1,1 @@
+lumi_test(test_capture FOLDERS capture mechanism base)
