@@ -41,8 +41,9 @@ static double sinc(double x)
     return x == 0 ? 1 : sin(LUMI_PI * x) / (LUMI_PI * x);
 }
 
-int lumi_warp_create(const struct lumi_lens *lens, const struct lumi_grid *grid, struct lumi_warp **result,
-                     struct lumi_error *error)
+/* Everything but the positions. */
+static int create(int source_width, int source_height, const struct lumi_grid *grid, struct lumi_warp **result,
+                  struct lumi_error *error)
 {
     struct lumi_warp *warp = lumi_calloc(1, sizeof *warp);
 
@@ -53,25 +54,49 @@ int lumi_warp_create(const struct lumi_lens *lens, const struct lumi_grid *grid,
         lumi_warp_destroy(warp);
         return lumi_fail(error, LUMI_ERR_NOMEM, "out of memory");
     }
-    warp->source_width = lens->width;
-    warp->source_height = lens->height;
+    warp->source_width = source_width;
+    warp->source_height = source_height;
     warp->width = grid->width;
     warp->height = grid->height;
     for (int i = 0; i <= LOBES * TABLE; i++)
         warp->lanczos[i] = (float)(sinc((double)i / TABLE) * sinc((double)i / TABLE / LOBES));
-    float *position = warp->positions;
+    *result = warp;
+    return LUMI_OK;
+}
+
+int lumi_warp_create(const struct lumi_lens *lens, const struct lumi_grid *grid, struct lumi_warp **result,
+                     struct lumi_error *error)
+{
+    LUMI_TRY(create(lens->width, lens->height, grid, result, error));
+    float *position = (*result)->positions;
     for (int y = 0; y < grid->height; y++)
         for (int x = 0; x < grid->width; x++, position += 2) {
             double tan_x, tan_y, sx, sy;
             lumi_grid_unproject(grid, x + 0.5, y + 0.5, &tan_x, &tan_y);
             if (!lumi_lens_project(lens, lumi_vec3(tan_x, tan_y, 1), &sx, &sy)) {
-                lumi_warp_destroy(warp);
+                lumi_warp_destroy(*result);
+                *result = NULL;
                 return lumi_fail(error, LUMI_ERR_ARG, "the lens does not image pixel (%d, %d) of the view", x, y);
             }
             position[0] = (float)sx;
             position[1] = (float)sy;
         }
-    *result = warp;
+    return LUMI_OK;
+}
+
+int lumi_warp_create_half(const struct lumi_grid *grid, const struct lumi_grid *half, struct lumi_warp **result,
+                          struct lumi_error *error)
+{
+    LUMI_TRY(create(grid->width, grid->height, half, result, error));
+    float *position = (*result)->positions;
+    for (int y = 0; y < half->height; y++)
+        for (int x = 0; x < half->width; x++, position += 2) {
+            double tan_x, tan_y, sx = 0, sy = 0;
+            lumi_grid_unproject(half, x + 0.5, y + 0.5, &tan_x, &tan_y);
+            lumi_grid_project(grid, lumi_vec3(tan_x, tan_y, 1), &sx, &sy);
+            position[0] = (float)sx;
+            position[1] = (float)sy;
+        }
     return LUMI_OK;
 }
 

@@ -17,6 +17,9 @@ bool lumi_warp_is_copy(const struct lumi_lens *lens, const struct lumi_grid *gri
 /* LUMI_ERR_ARG if the lens does not image some pixel of the grid. */
 int lumi_warp_create(const struct lumi_lens *lens, const struct lumi_grid *grid, struct lumi_warp **warp,
                      struct lumi_error *error);
+/* From a view to the same view at half resolution (lumi_grid_init_half). */
+int lumi_warp_create_half(const struct lumi_grid *grid, const struct lumi_grid *half, struct lumi_warp **warp,
+                          struct lumi_error *error);
 void lumi_warp_destroy(struct lumi_warp *warp);
 
 /* `source` is 3-channel F32 (linear light), lens-sized; `result`, as large as the grid, is made (release it with

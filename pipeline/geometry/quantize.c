@@ -11,10 +11,10 @@
 #define FINEST_STEP 0.03
 
 struct codes {
-    int *code;      /* of each vertex */
-    int *shift;     /* of each tile */
+    int *code;       /* of each vertex */
+    int *shift;      /* of each tile */
     int *low, *high; /* of each tile's codes */
-    int *coarsest;  /* shift among the tiles of each vertex */
+    int *coarsest;   /* shift among the tiles of each vertex */
 };
 
 /* Rounds each vertex to the coarsest step of its tiles; raises the step of tiles whose range is over 255 steps, until
@@ -123,8 +123,7 @@ static int tile_vertices(const struct surface *s, struct tiles *t, int tile)
             t->seen[v] = tile + 1;
             const struct lumi_mesh_vertex place = {(uint8_t)(s->vertices[v].x - left),
                                                    (uint8_t)(s->vertices[v].y - top), 0};
-            t->order[count++] =
-                (struct local){v, rank(&place, right, bottom) << 16 | place.t << 8 | place.s};
+            t->order[count++] = (struct local){v, rank(&place, right, bottom) << 16 | place.t << 8 | place.s};
         }
     qsort(t->order, (size_t)count, sizeof *t->order, by_order);
     for (int k = 0; k < count; k++)

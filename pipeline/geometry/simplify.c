@@ -86,7 +86,8 @@ static bool circle_holds(const struct surface *s, int p, int b, int c, int q)
         y[i] = s->vertices[v[i]].y - o->y;
         r[i] = x[i] * x[i] + y[i] * y[i];
     }
-    return r[0] * (x[1] * y[2] - x[2] * y[1]) + r[1] * (x[2] * y[0] - x[0] * y[2]) + r[2] * (x[0] * y[1] - x[1] * y[0]) >
+    return r[0] * (x[1] * y[2] - x[2] * y[1]) + r[1] * (x[2] * y[0] - x[0] * y[2]) +
+               r[2] * (x[0] * y[1] - x[1] * y[0]) >
            0;
 }
 

@@ -29,15 +29,19 @@ int surface_init(struct surface *s, const struct lumi_grid *grid, int triangle_l
         return LUMI_ERR_NOMEM;
     for (int j = 0; j <= rows; j++)
         for (int i = 0; i <= cols; i++)
-            s->vertices[j * (cols + 1) + i] = (struct surface_vertex){i < cols ? i * LATTICE : s->right,
-                                                                      j < rows ? j * LATTICE : s->bottom, 0, 0};
+            s->vertices[j * (cols + 1) + i] =
+                (struct surface_vertex){i < cols ? i * LATTICE : s->right, j < rows ? j * LATTICE : s->bottom, 0, 0};
     s->vertex_count = (cols + 1) * (rows + 1);
     for (int j = 0; j < rows; j++)
         for (int i = 0; i < cols; i++) {
             const int tile = j * cols + i, a = j * (cols + 1) + i, t = 2 * tile;
             /* Upper right (a, b, d) and lower left (a, d, c) halves. */
-            s->triangles[t] = (struct surface_triangle){
-                {a, a + 1, a + cols + 2}, {i + 1 < cols ? t + 3 : -1, t + 1, j > 0 ? t - 2 * cols + 1 : -1}, tile, 0, 0};
+            s->triangles[t] =
+                (struct surface_triangle){{a, a + 1, a + cols + 2},
+                                          {i + 1 < cols ? t + 3 : -1, t + 1, j > 0 ? t - 2 * cols + 1 : -1},
+                                          tile,
+                                          0,
+                                          0};
             s->triangles[t + 1] = (struct surface_triangle){
                 {a, a + cols + 2, a + cols + 1}, {j + 1 < rows ? t + 2 * cols : -1, i > 0 ? t - 2 : -1, t}, tile, 0, 0};
             s->vertices[a].triangle = s->vertices[a + 1].triangle = t;

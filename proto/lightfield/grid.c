@@ -92,3 +92,14 @@ void lumi_grid_unproject(const struct lumi_grid *grid, double x, double y, doubl
     *tan_x = tangent(grid->tan_x, grid->cols, x);
     *tan_y = tangent(grid->tan_y, grid->rows, y);
 }
+
+bool lumi_grid_init_half(struct lumi_grid *half, const struct lumi_grid *grid)
+{
+    if (!init_size(half, (grid->width + 1) / 2, (grid->height + 1) / 2))
+        return false;
+    for (int i = 0; i <= half->cols; i++)
+        half->tan_x[i] = tangent(grid->tan_x, grid->cols, 2.0 * LUMI_TILE * i);
+    for (int i = 0; i <= half->rows; i++)
+        half->tan_y[i] = tangent(grid->tan_y, grid->rows, 2.0 * LUMI_TILE * i);
+    return lumi_grid_valid(half);
+}

@@ -29,6 +29,10 @@ bool lumi_grid_init_equiangular(struct lumi_grid *grid, int width, int height, d
 /* The plain pinhole with these focal lengths and principal point: pixels map one to one. */
 bool lumi_grid_init_pinhole(struct lumi_grid *grid, int width, int height, double fx, double fy, double cx, double cy);
 
+/* The same view at half resolution (sizes rounded up): its tiles span two of the grid's each way, and are rectilinear
+ * as every tile is, so its pixels are not simply pairs of the grid's. */
+bool lumi_grid_init_half(struct lumi_grid *half, const struct lumi_grid *grid);
+
 /* Sizes in range, tangents finite and rising. */
 bool lumi_grid_valid(const struct lumi_grid *grid);
 
