@@ -1,0 +1,265 @@
+/* pipeline/run: stages are run once, skipped when nothing changed, resumed after a failure, atomic. */
+#include "pipeline/run/run.h"
+#include "proto/capture/capture.h"
+
+#include <glib.h>
+#include <glib/gstdio.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define IMAGES 12
+
+static char *folder;
+static atomic_int made;
+static int fail_at = -1, parameter = 1;
+
+static int make_capture(void **state)
+{
+    struct lumi_capture *capture;
+    struct lumi_capture_lens lens = {.name = "lens"};
+    struct lumi_error error = {0};
+    int64_t lens_id, camera, frame;
+
+    (void)state;
+    folder = g_dir_make_tmp("lumi-run-XXXXXX", NULL);
+    g_autofree char *path = g_build_filename(folder, "capture", NULL);
+    lumi_lens_init_pinhole(&lens.lens, 8, 6, 1);
+    assert_int_equal(lumi_capture_create(path, &capture, &error), LUMI_OK);
+    assert_int_equal(lumi_capture_add_lens(capture, &lens, &lens_id, &error), LUMI_OK);
+    assert_int_equal(lumi_capture_add_camera(capture, "camera", lens_id, &camera, &error), LUMI_OK);
+    assert_int_equal(lumi_capture_begin(capture, &error), LUMI_OK);
+    for (int i = 0; i < IMAGES; i++) {
+        g_autofree char *name = g_strdup_printf("view%02d", i);
+        const struct lumi_capture_new_frame new_frame = {.name = name, .camera = camera, .row = i / 4, .column = i % 4};
+        const struct lumi_capture_file file = {.extension = ".png", .width = 8, .height = 6,
+                                               .camera_time_us = LUMI_NO_TIME};
+        struct lumi_pose pose;
+        lumi_pose_look(lumi_vec3(i % 4, 0, i / 4), lumi_vec3(0, 1, 0), lumi_vec3(0, 0, 1), &pose);
+        assert_int_equal(lumi_capture_add_frame(capture, &new_frame, &frame, &error), LUMI_OK);
+        assert_int_equal(lumi_capture_store_bytes(capture, frame, name, strlen(name), &file, &error), LUMI_OK);
+        if (i < IMAGES - 1) /* the last one has no pose */
+            assert_int_equal(lumi_capture_set_pose(capture, frame, &pose, LUMI_POSE_TRUE, "test", &error), LUMI_OK);
+    }
+    assert_int_equal(lumi_capture_commit(capture, &error), LUMI_OK);
+    assert_int_equal(lumi_capture_publish(capture, NULL, &error), LUMI_OK);
+    lumi_capture_close(capture);
+    return 0;
+}
+
+static int remove_capture(void **state)
+{
+    g_autofree char *command = g_strdup_printf("rm -rf '%s'", folder);
+
+    (void)state;
+    g_free(folder);
+    return g_spawn_command_line_sync(command, NULL, NULL, NULL, NULL) ? 0 : 1;
+}
+
+static struct lumi_run *open_run(bool alone)
+{
+    g_autofree char *path = g_build_filename(folder, "capture/", NULL);
+    struct lumi_parameters parameters;
+    struct lumi_run *run;
+    struct lumi_error error = {0};
+
+    lumi_run_defaults(&parameters);
+    if (lumi_run_open(path, NULL, &parameters, 4, alone, &run, &error) != LUMI_OK)
+        fail_msg("%s", error.text);
+    return run;
+}
+
+static int key_first(struct lumi_run *run, int index, struct lumi_key *key, struct lumi_error *error)
+{
+    (void)error;
+    lumi_key_bytes(key, run->sources[index].sha256, 64);
+    lumi_key_int(key, parameter);
+    return LUMI_OK;
+}
+
+static int make_first(struct lumi_run *run, void *state, int index, int thread, const char *path,
+                      struct lumi_error *error)
+{
+    g_autofree char *text = g_strdup_printf("%s %d\n", run->sources[index].name, parameter);
+
+    (void)state;
+    (void)thread;
+    g_file_set_contents(path, index == fail_at ? "half" : text, -1, NULL);
+    if (index == fail_at)
+        return lumi_fail(error, LUMI_ERR_IO, "image %d failed", index);
+    made++;
+    return LUMI_OK;
+}
+
+static int key_all(struct lumi_run *run, int index, struct lumi_key *key, struct lumi_error *error)
+{
+    (void)error;
+    (void)index;
+    for (int i = 0; i < run->count; i++)
+        lumi_key_input(key, run, "first", i);
+    return LUMI_OK;
+}
+
+static int make_all(struct lumi_run *run, void *state, int index, int thread, const char *path,
+                    struct lumi_error *error)
+{
+    g_autoptr(GString) text = g_string_new(NULL);
+
+    (void)state;
+    (void)thread;
+    (void)error;
+    assert_int_equal(index, -1);
+    for (int i = 0; i < run->count; i++) {
+        g_autofree char *input = lumi_run_path(run, "first", i, ".txt"), *line = NULL;
+        assert_true(g_file_get_contents(input, &line, NULL, NULL));
+        g_string_append(text, line);
+    }
+    made++;
+    return g_file_set_contents(path, text->str, -1, NULL) ? LUMI_OK : LUMI_ERR_IO;
+}
+
+static const struct lumi_stage first = {
+    .name = "first", .title = "first", .version = 1, .extension = ".txt", .key = key_first, .make = make_first};
+static const struct lumi_stage all = {.name = "everything", .title = "everything", .version = 1, .extension = ".out",
+                                      .whole = true, .key = key_all, .make = make_all};
+
+static int run_count(struct lumi_run *run, const struct lumi_stage *stage, int from, int to, int *skipped)
+{
+    struct lumi_error error = {0};
+
+    made = 0;
+    assert_int_equal(lumi_run_stage(run, stage, from, to, skipped, &error), LUMI_OK);
+    return made;
+}
+
+static void frames_with_a_pose_become_sources_in_order(void **state)
+{
+    struct lumi_run *run = open_run(true);
+
+    (void)state;
+    assert_int_equal(run->count, IMAGES - 1);
+    assert_string_equal(run->sources[5].name, "view05");
+    assert_int_equal(run->sources[5].row, 1);
+    assert_true(run->sources[5].pose.t.x == 1);
+    assert_true(g_file_test(run->sources[5].path, G_FILE_TEST_EXISTS));
+    assert_true(g_str_has_suffix(run->work, "/capture.work"));
+    lumi_run_close(run);
+}
+
+static void a_stage_is_run_once_and_again_when_a_parameter_changes(void **state)
+{
+    struct lumi_run *run = open_run(true);
+    int skipped;
+
+    (void)state;
+    assert_int_equal(run_count(run, &first, 0, 4, &skipped), 4);
+    assert_int_equal(run_count(run, &first, 0, run->count, &skipped), IMAGES - 5);
+    assert_int_equal(skipped, 4);
+    assert_int_equal(run_count(run, &all, 0, run->count, &skipped), 1);
+    lumi_run_close(run);
+
+    run = open_run(true); /* another program */
+    assert_int_equal(run_count(run, &first, 0, run->count, &skipped), 0);
+    assert_int_equal(run_count(run, &all, 0, run->count, &skipped), 0);
+    parameter = 2;
+    assert_int_equal(run_count(run, &first, 3, 4, &skipped), 1);
+    assert_int_equal(run_count(run, &all, 0, run->count, &skipped), 1);
+    parameter = 1;
+    assert_int_equal(run_count(run, &first, 0, run->count, &skipped), 1);
+    lumi_run_close(run);
+}
+
+static void an_output_that_was_cut_short_is_made_again(void **state)
+{
+    struct lumi_run *run = open_run(true);
+    int skipped;
+
+    (void)state;
+    run_count(run, &first, 0, run->count, &skipped);
+    g_autofree char *path = lumi_run_path(run, "first", 2, ".txt");
+    assert_true(g_file_set_contents(path, "v", -1, NULL));
+    lumi_run_close(run);
+    run = open_run(true);
+    assert_int_equal(run_count(run, &first, 0, run->count, &skipped), 1);
+    lumi_run_close(run);
+}
+
+static void a_failed_image_leaves_nothing_and_is_named(void **state)
+{
+    struct lumi_run *run = open_run(true);
+    struct lumi_error error = {0};
+    int skipped;
+
+    (void)state;
+    parameter = 7;
+    fail_at = 6;
+    assert_int_equal(lumi_run_stage(run, &first, 0, run->count, &skipped, &error), LUMI_ERR_IO);
+    assert_string_equal(error.text, "image 6 failed");
+    g_autofree char *folder_path = g_build_filename(run->work, "first", NULL);
+    g_autoptr(GDir) dir = g_dir_open(folder_path, 0, NULL);
+    for (const char *name; (name = g_dir_read_name(dir));)
+        assert_null(strstr(name, ".tmp-"));
+    fail_at = -1;
+    assert_true(run_count(run, &first, 0, run->count, &skipped) <= IMAGES - 1 - 6);
+    lumi_run_close(run);
+}
+
+static void a_stage_whose_input_is_missing_says_which_stage_to_run(void **state)
+{
+    g_autofree char *path = g_build_filename(folder, "capture", NULL);
+    g_autofree char *work = g_build_filename(folder, "elsewhere", NULL);
+    struct lumi_parameters parameters;
+    struct lumi_run *run;
+    struct lumi_error error = {0};
+
+    (void)state;
+    lumi_run_defaults(&parameters);
+    assert_int_equal(lumi_run_open(path, work, &parameters, 1, true, &run, &error), LUMI_OK);
+    assert_int_equal(lumi_run_stage(run, &all, 0, run->count, NULL, &error), LUMI_ERR_NOTFOUND);
+    assert_non_null(strstr(error.text, "'first' of view00"));
+    assert_int_equal(lumi_run_stage(run, &first, 3, 100, NULL, &error), LUMI_ERR_ARG);
+    lumi_run_close(run);
+}
+
+static void one_run_alone_keeps_others_out_and_clears_what_a_killed_one_left(void **state)
+{
+    g_autofree char *path = g_build_filename(folder, "capture", NULL);
+    g_autofree char *left = g_build_filename(folder, "capture.work/first/view00.txt.tmp-99999.txt", NULL);
+    struct lumi_parameters parameters;
+    struct lumi_run *run, *second;
+    struct lumi_error error = {0};
+
+    (void)state;
+    g_file_set_contents(left, "half", -1, NULL);
+    run = open_run(true);
+    assert_false(g_file_test(left, G_FILE_TEST_EXISTS));
+    lumi_run_defaults(&parameters);
+    assert_int_equal(lumi_run_open(path, NULL, &parameters, 1, true, &second, &error), LUMI_ERR_BUSY);
+    assert_int_equal(lumi_run_open(path, NULL, &parameters, 1, false, &second, &error), LUMI_ERR_BUSY);
+    lumi_run_close(run);
+    run = open_run(false);
+    assert_int_equal(lumi_run_open(path, NULL, &parameters, 1, false, &second, &error), LUMI_OK);
+    lumi_run_close(second);
+    lumi_run_close(run);
+    assert_int_equal(lumi_run_open("/nonexistent", NULL, &parameters, 1, true, &run, &error), LUMI_ERR_NOTFOUND);
+    assert_non_null(strstr(error.text, "/nonexistent"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(frames_with_a_pose_become_sources_in_order),
+        cmocka_unit_test(a_stage_is_run_once_and_again_when_a_parameter_changes),
+        cmocka_unit_test(an_output_that_was_cut_short_is_made_again),
+        cmocka_unit_test(a_failed_image_leaves_nothing_and_is_named),
+        cmocka_unit_test(a_stage_whose_input_is_missing_says_which_stage_to_run),
+        cmocka_unit_test(one_run_alone_keeps_others_out_and_clears_what_a_killed_one_left),
+    };
+    return cmocka_run_group_tests(tests, make_capture, remove_capture);
+}
