@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-const struct sim_place *const sim_places[] = {&sim_room, NULL};
+const struct sim_place *const sim_places[] = {&sim_room, &sim_court, &sim_object, NULL};
 
 int sim_place_open(const char *name, struct sim_scene **result, struct lumi_error *error)
 {
