@@ -6,7 +6,7 @@
 static void backdrop(struct sim_scene *s)
 {
     struct sim_material shine;
-    const float r = 2.5f, w = 0.8f;
+    const float r = 2.5f, w = 1.1f;
     int paint[2] = {sim_paint(s, v3(0.44f, 0.46f, 0.48f), 0.18f, 1), sim_paint(s, v3(0.50f, 0.46f, 0.40f), 0.18f, 2)};
 
     sim_material_init(&shine);
@@ -18,16 +18,10 @@ static void backdrop(struct sim_scene *s)
         sim_scene_place(s, v3(0, 0, 0), 90.0f * (float)i, 1);
         sim_quad(s, v3(-r, r, -r), v3(2 * r, 0, 0), v3(0, 0, 2 * r), 0.2f, paint[i & 1]);
     }
-    /* Shining panels above and, smaller, on two sides. */
+    /* A shining panel above. */
     sim_scene_place(s, v3(0, 0, 0), 0, 1);
     sim_quad(s, v3(-w, w, r - 0.02f), v3(2 * w, 0, 0), v3(0, -2 * w, 0), 0.4f, lamp);
     sim_scene_light(s, v3(-w, w, r - 0.02f), v3(2 * w, 0, 0), v3(0, -2 * w, 0));
-    for (int i = 0; i < 2; i++) {
-        sim_scene_place(s, v3(0, 0, 0), 130.0f * (float)i, 1);
-        sim_quad(s, v3(-0.4f, 1.9f, 0.2f), v3(0.8f, 0, 0), v3(0, 0, 1.0f), 0.4f, lamp);
-        sim_scene_light(s, v3(-0.4f, 1.9f, 0.2f), v3(0.8f, 0, 0), v3(0, 0, 1.0f));
-    }
-    sim_scene_place(s, v3(0, 0, 0), 0, 1);
 }
 
 static void build(struct sim_scene *s)

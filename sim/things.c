@@ -264,7 +264,11 @@ void sim_bowl(struct sim_scene *s, float r, int material, const int *fruit, int 
 
 void sim_tree(struct sim_scene *s, float height, float crown, int leaves, int bark, int leaf, unsigned seed)
 {
-    sim_bar(s, v3(0, 0, 0), v3(0.03f * height, 0.02f * height, 0.75f * height), 0.022f * height, 12, bark);
+    for (int i = 0; i < 5; i++) {
+        float a = (float)i / 5, b = a + 0.2f, r = height * (0.024f - 0.019f * a);
+        sim_bar(s, v3(0.03f * height * a, 0.02f * height * a, 0.78f * height * a),
+                v3(0.03f * height * b, 0.02f * height * b, 0.78f * height * b), r, 12, bark);
+    }
     for (int i = 0; i < 12; i++) {
         float z = height * (0.38f + 0.03f * (float)i), angle = 2.4f * (float)i;
         float r = crown * (0.55f + 0.3f * sim_hash(i, 1, seed));
@@ -276,7 +280,7 @@ void sim_tree(struct sim_scene *s, float height, float crown, int leaves, int ba
             float q = 0.42f * crown * cbrtf(sim_hash(n, 5, seed)), c = sqrtf(1 - b * b);
             struct sim_v3 at = v3_along(tip, v3(c * cosf(a), c * sinf(a), 0.8f * b), q);
             struct sim_v3 along = v3(cosf(7 * a), sinf(7 * a), 0.6f * sim_hash(n, 6, seed) - 0.5f);
-            float size = 0.10f + 0.08f * sim_hash(n, 7, seed);
+            float size = 0.02f * height + 0.07f + 0.08f * sim_hash(n, 7, seed);
             sim_leaf(s, at, along, v3(0.5f * sinf(5 * a), 0.5f * cosf(3 * a), 1), size, 0.5f * size, 0.4f, leaf);
         }
     }

@@ -1,0 +1,13 @@
+/* A capture of a place, as a rig's daemon would have stored it, with true poses. */
+#ifndef LUMI_SIM_SHOOT_H
+#define LUMI_SIM_SHOOT_H
+
+#include "sim/truth.h"
+
+/* Renders every frame of the rig into a new capture at `path`, which appears when it is whole. The metadata say what
+ * was simulated and on which surface the cameras are. Depth maps go to output->depth_dir, one NAME.exr a frame, if set.
+ */
+int sim_shoot(const struct sim_scene *scene, const char *place, const struct sim_rig *rig,
+              const struct sim_output *output, const char *path, struct lumi_error *error);
+
+#endif
