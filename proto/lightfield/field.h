@@ -43,12 +43,16 @@ struct lumi_field_info {
     uint64_t geometry_bytes[LUMI_LEVELS];
     uint64_t index_bytes;         /* header, tables, poses, disks, lenses */
     uint64_t pixels[LUMI_LEVELS]; /* coded image pixels */
+    uint64_t coded_tiles[LUMI_LEVELS];
+    int cluster_count[LUMI_LEVELS]; /* reference images */
+    int quantizer[LUMI_LEVELS];     /* of tiles: VP9's base_q_idx, 0..255 */
 };
 
 struct lumi_field; /* immutable once open: any number of threads may read it */
 
 /* Maps and checks a file; decodes the reference images of both levels into memory (threads: as lumi_parallel_for).
- * Every error names `path`. LUMI_ERR_VERSION for a newer file. */
+ * Damage to a reference image or to the images of a cluster shows when its tiles are decoded; any other damage is
+ * LUMI_ERR_CHECKSUM here. Every error names `path`. LUMI_ERR_VERSION for a newer file. */
 int lumi_field_open(const char *path, int threads, struct lumi_field **field, struct lumi_error *error);
 /* The same from memory, which stays the caller's and must outlive the field; `name` stands for the path. */
 int lumi_field_open_memory(const void *data, size_t size, const char *name, int threads, struct lumi_field **field,

@@ -192,7 +192,7 @@ static bool in_range(const struct lumi_tile_entry *entry, int dictionary_count)
         if (entry->shift[k].x < -LUMI_SHIFT_MAX || entry->shift[k].x > LUMI_SHIFT_MAX ||
             entry->shift[k].y < -LUMI_SHIFT_MAX || entry->shift[k].y > LUMI_SHIFT_MAX)
             return false;
-    return entry->size <= LUMI_TILE_DATA_MAX && entry->fields.interpolation <= 4 &&
+    return entry->size <= LUMI_TILE_DATA_MAX + 1 + LUMI_TILE_COMPRESSED_MAX && entry->fields.interpolation <= 4 &&
            (entry->dictionary < dictionary_count || entry->dictionary == LUMI_DICTIONARY_NONE);
 }
 

@@ -38,8 +38,8 @@ static int make_capture(void **state)
     for (int i = 0; i < IMAGES; i++) {
         g_autofree char *name = g_strdup_printf("view%02d", i);
         const struct lumi_capture_new_frame new_frame = {.name = name, .camera = camera, .row = i / 4, .column = i % 4};
-        const struct lumi_capture_file file = {.extension = ".png", .width = 8, .height = 6,
-                                               .camera_time_us = LUMI_NO_TIME};
+        const struct lumi_capture_file file = {
+            .extension = ".png", .width = 8, .height = 6, .camera_time_us = LUMI_NO_TIME};
         struct lumi_pose pose;
         lumi_pose_look(lumi_vec3(i % 4, 0, i / 4), lumi_vec3(0, 1, 0), lumi_vec3(0, 0, 1), &pose);
         assert_int_equal(lumi_capture_add_frame(capture, &new_frame, &frame, &error), LUMI_OK);
@@ -126,8 +126,13 @@ static int make_all(struct lumi_run *run, void *state, int index, int thread, co
 
 static const struct lumi_stage first = {
     .name = "first", .title = "first", .version = 1, .extension = ".txt", .key = key_first, .make = make_first};
-static const struct lumi_stage all = {.name = "everything", .title = "everything", .version = 1, .extension = ".out",
-                                      .whole = true, .key = key_all, .make = make_all};
+static const struct lumi_stage all = {.name = "everything",
+                                      .title = "everything",
+                                      .version = 1,
+                                      .extension = ".out",
+                                      .whole = true,
+                                      .key = key_all,
+                                      .make = make_all};
 
 static int run_count(struct lumi_run *run, const struct lumi_stage *stage, int from, int to, int *skipped)
 {

@@ -1,0 +1,204 @@
+/* The stage `compress`. */
+#include "pipeline/compress/compress.h"
+
+#include "pipeline/compress/level.h"
+#include "pipeline/geometry/disks.h"
+#include "proto/base/file.h"
+#include "proto/base/memory.h"
+#include "proto/lightfield/field_write.h"
+
+#include <glib.h>
+#include <glib/gstdio.h>
+#include <string.h>
+
+static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
+{
+    const struct lumi_parameters *parameters = &run->parameters;
+
+    (void)index;
+    (void)error;
+    lumi_key_int(k, parameters->quality);
+    lumi_key_int(k, parameters->target_bytes);
+    lumi_key_int(k, parameters->cluster_size);
+    lumi_key_int(k, parameters->disk_shape);
+    lumi_key_int(k, parameters->kernel);
+    lumi_key_double(k, parameters->disk_scale);
+    for (int i = 0; i < run->count; i++) {
+        lumi_key_bytes(k, run->sources[i].name, sizeof run->sources[i].name);
+        lumi_key_bytes(k, &run->sources[i].pose, sizeof run->sources[i].pose);
+        lumi_key_input(k, run, "equiangular", i);
+        lumi_key_input(k, run, "depth", i);
+        lumi_key_input(k, run, "geometry", i);
+        lumi_key_input(k, run, "geometry-coarse", i);
+    }
+    return LUMI_OK;
+}
+
+/* Both levels, and what the file's writer asks of them. */
+struct assembly {
+    struct compress_level levels[LUMI_LEVELS];
+    struct lumi_grid grids[LUMI_LEVELS];
+    struct lumi_field_view *views[LUMI_LEVELS];
+};
+
+static int mesh(void *context, int index, int view, struct lumi_writer *bytes, struct lumi_error *error)
+{
+    const struct assembly *assembly = context;
+    const struct compress_level *level = &assembly->levels[index];
+    g_autofree char *path = lumi_run_path(level->run, index == LUMI_LEVEL_COARSE ? "geometry-coarse" : "geometry",
+                                          level->sources[view], ".mesh");
+    uint8_t *data;
+    size_t size;
+
+    LUMI_TRY(lumi_file_read(path, (size_t)1 << 30, &data, &size, error));
+    lumi_write_bytes(bytes, data, size);
+    lumi_free(data);
+    return LUMI_OK;
+}
+
+static int references(void *context, int level, int run, uint32_t *sizes, struct lumi_writer *bytes,
+                      struct lumi_error *error)
+{
+    const struct assembly *assembly = context;
+
+    return compress_level_references(&assembly->levels[level], run, sizes, bytes, error);
+}
+
+static int cluster(void *context, int level, int index, struct lumi_writer *bytes, struct lumi_error *error)
+{
+    const struct assembly *assembly = context;
+
+    return compress_level_cluster(&assembly->levels[level], index, bytes, error);
+}
+
+static int make_views(const struct compress_level *level, struct lumi_field_view **views, struct lumi_error *error)
+{
+    const struct lumi_run *run = level->run;
+    struct lumi_disk *disks = lumi_calloc((size_t)level->count, sizeof *disks);
+    int code;
+
+    *views = lumi_calloc((size_t)level->count, sizeof **views);
+    if (!disks || !*views) {
+        lumi_free(disks);
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for the views of a level");
+    }
+    code = lumi_disks_make(level->count, level->poses, run->surface, run->centre, run->radius,
+                           run->parameters.disk_scale, disks, error);
+    for (int i = 0; code == LUMI_OK && i < level->count; i++) {
+        struct lumi_field_view *view = &(*views)[i];
+        g_strlcpy(view->name, run->sources[level->sources[i]].name, sizeof view->name);
+        view->grid = level->index;
+        view->pose = level->poses[i];
+        view->disk = disks[i];
+    }
+    lumi_free(disks);
+    return code;
+}
+
+static int assemble(struct assembly *assembly, const char *path, int quality, struct lumi_error *error)
+{
+    const struct lumi_run *run = assembly->levels[0].run;
+    struct lumi_field_content content = {.surface = run->surface,
+                                         .centre = run->centre,
+                                         .radius = run->radius,
+                                         .disk_shape = run->parameters.disk_shape,
+                                         .kernel = run->parameters.kernel,
+                                         .quality = quality,
+                                         .grid_count = LUMI_LEVELS,
+                                         .grids = assembly->grids,
+                                         .context = assembly,
+                                         .mesh = mesh,
+                                         .references = references,
+                                         .cluster = cluster};
+
+    for (int i = 0; i < LUMI_LEVELS; i++) {
+        const struct compress_level *level = &assembly->levels[i];
+        assembly->grids[i] = level->grid;
+        content.levels[i] = (struct lumi_field_level_content){.view_count = level->count,
+                                                              .views = assembly->views[i],
+                                                              .cluster_count = level->clusters.count,
+                                                              .first = level->clusters.first,
+                                                              .members = level->clusters.members,
+                                                              .priming = lumi_tile_encoder_priming(level->encoder)};
+    }
+    return lumi_field_write(path, &content, error);
+}
+
+/* Codes everything at one quality and writes the file. */
+static int write_at(struct lumi_run *run, int quality, const char *path, struct lumi_error *error)
+{
+    struct assembly *assembly = lumi_calloc(1, sizeof *assembly);
+    int code = assembly ? LUMI_OK : lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a field");
+
+    for (int i = 0; code == LUMI_OK && i < LUMI_LEVELS; i++) {
+        code = compress_level_init(&assembly->levels[i], run, i, quality, error);
+        if (code == LUMI_OK)
+            code = make_views(&assembly->levels[i], &assembly->views[i], error);
+        if (code == LUMI_OK)
+            code = compress_level_code(&assembly->levels[i], error);
+    }
+    if (code == LUMI_OK)
+        code = assemble(assembly, path, quality, error);
+    for (int i = 0; assembly && i < LUMI_LEVELS; i++) {
+        compress_level_finish(&assembly->levels[i]);
+        lumi_free(assembly->views[i]);
+    }
+    lumi_free(assembly);
+    return code;
+}
+
+static int file_size(const char *path, long long *size, struct lumi_error *error)
+{
+    GStatBuf status;
+
+    if (g_stat(path, &status))
+        return lumi_fail_errno(error, path, "examine");
+    *size = (long long)status.st_size;
+    return LUMI_OK;
+}
+
+/* The highest quality whose file is no larger than `target`: bisection, since larger quality makes larger files. */
+static int write_within(struct lumi_run *run, long long target, const char *path, struct lumi_error *error)
+{
+    int low = 0, high = 100, written = -1;
+    long long size = 0;
+
+    while (low < high) {
+        int middle = (low + high + 1) / 2;
+        LUMI_TRY(write_at(run, middle, path, error));
+        LUMI_TRY(file_size(path, &size, error));
+        written = middle;
+        if (size <= target)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    if (written != low)
+        LUMI_TRY(write_at(run, low, path, error));
+    LUMI_TRY(file_size(path, &size, error));
+    if (size > target)
+        return lumi_fail(error, LUMI_ERR_LIMIT,
+                         "the smallest field of this capture has %lld bytes, %lld were asked for", size, target);
+    return LUMI_OK;
+}
+
+static int make(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error)
+{
+    (void)state;
+    (void)index;
+    (void)thread;
+    if (run->parameters.target_bytes > 0)
+        return write_within(run, run->parameters.target_bytes, path, error);
+    return write_at(run, run->parameters.quality, path, error);
+}
+
+const struct lumi_stage lumi_stage_compress = {
+    .name = "compress",
+    .title = "compress",
+    .version = 1,
+    .extension = ".lumi",
+    .whole = true,
+    .serial = true,
+    .key = key,
+    .make = make,
+};
