@@ -1,0 +1,171 @@
+/* Depth and meshes of a view, for other programs. */
+#include "pipeline/exchange/view_export.h"
+
+#include "pipeline/exchange/ply.h"
+#include "proto/base/memory.h"
+#include "proto/image/image.h"
+
+#include <string.h>
+
+/* Place of a vertex in the image, and its inverse depth. */
+struct corner {
+    double x, y, w;
+};
+
+static struct corner corner_of(const struct lumi_view_mesh *mesh, int tile, const struct lumi_mesh_vertex *vertex)
+{
+    struct corner c = {
+        (tile % mesh->cols) * LUMI_TILE + vertex->s * (LUMI_TILE / 255.0),
+        (tile / mesh->cols) * LUMI_TILE + vertex->t * (LUMI_TILE / 255.0),
+        lumi_mesh_inverse_depth(mesh, &mesh->tiles[tile], vertex->d),
+    };
+
+    return c;
+}
+
+/* Within a tile the lens is rectilinear, so inverse depth is linear in the image. Edges count as inside on both sides:
+ * the two triangles agree there. */
+static void fill_triangle(const struct corner c[3], const struct lumi_raster *out)
+{
+    double area = (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x);
+
+    if (area == 0)
+        return;
+    int x0 = (int)fmax(0, ceil(fmin(fmin(c[0].x, c[1].x), c[2].x) - 0.5));
+    int y0 = (int)fmax(0, ceil(fmin(fmin(c[0].y, c[1].y), c[2].y) - 0.5));
+    int x1 = (int)fmin(out->width - 1, floor(fmax(fmax(c[0].x, c[1].x), c[2].x) - 0.5));
+    int y1 = (int)fmin(out->height - 1, floor(fmax(fmax(c[0].y, c[1].y), c[2].y) - 0.5));
+    for (int y = y0; y <= y1; y++)
+        for (int x = x0; x <= x1; x++) {
+            double px = x + 0.5, py = y + 0.5;
+            double a = ((c[1].x - px) * (c[2].y - py) - (c[1].y - py) * (c[2].x - px)) / area;
+            double b = ((c[2].x - px) * (c[0].y - py) - (c[2].y - py) * (c[0].x - px)) / area;
+            if (a < -1e-9 || b < -1e-9 || a + b > 1 + 1e-9)
+                continue;
+            float w = (float)(a * c[0].w + b * c[1].w + (1 - a - b) * c[2].w);
+            float *there = &lumi_row_f32(out, y)[x];
+            if (!(*there >= w)) /* nearer, or nothing yet */
+                *there = w;
+        }
+}
+
+int lumi_mesh_rasterise(const struct lumi_grid *grid, const struct lumi_view_mesh *mesh,
+                        struct lumi_raster *inverse_depth, struct lumi_error *error)
+{
+    int code = lumi_raster_create(inverse_depth, grid->width, grid->height, 1, LUMI_F32);
+
+    if (code != LUMI_OK)
+        return lumi_fail(error, code, "no memory for %dx%d pixels of depth", grid->width, grid->height);
+    for (int y = 0; y < grid->height; y++)
+        for (int x = 0; x < grid->width; x++)
+            lumi_row_f32(inverse_depth, y)[x] = NAN;
+    for (int i = 0; i < mesh->cols * mesh->rows; i++) {
+        const struct lumi_tile_mesh *tile = &mesh->tiles[i];
+        for (int t = 0; t < tile->triangle_count; t++) {
+            struct corner c[3];
+            for (int k = 0; k < 3; k++)
+                c[k] = corner_of(mesh, i, &tile->vertices[tile->indices[3 * t + k]]);
+            fill_triangle(c, inverse_depth);
+        }
+    }
+    return LUMI_OK;
+}
+
+int lumi_export_depth(const char *path, const struct lumi_raster *inverse_depth, struct lumi_error *error)
+{
+    struct lumi_image_options options;
+    struct lumi_raster depth;
+
+    lumi_image_options_init(&options);
+    options.format = LUMI_IMAGE_EXR;
+    options.half = false;
+    options.channel = "Z";
+    options.sync = true;
+    int code = lumi_raster_create(&depth, inverse_depth->width, inverse_depth->height, 1, LUMI_F32);
+    if (code != LUMI_OK)
+        return lumi_fail(error, code, "%s: no memory to write it", path);
+    for (int y = 0; y < depth.height; y++)
+        for (int x = 0; x < depth.width; x++) {
+            float w = lumi_row_f32(inverse_depth, y)[x];
+            lumi_row_f32(&depth, y)[x] = w <= 0 ? INFINITY : 1 / w;
+        }
+    code = lumi_image_write(path, &depth, &options, error);
+    lumi_raster_finish(&depth);
+    return code;
+}
+
+/* What lumi_export_mesh hands to the writer. */
+struct arrays {
+    float *positions, *texture;
+    uint8_t *colours;
+    uint32_t *indices;
+};
+
+static void place_vertex(const struct lumi_grid *grid, const struct lumi_pose *pose, const struct lumi_raster *image,
+                         struct corner c, double far_m, const struct arrays *arrays, size_t at)
+{
+    double tan_x, tan_y;
+
+    lumi_grid_unproject(grid, c.x, c.y, &tan_x, &tan_y);
+    double z = c.w * far_m > 1 ? 1 / c.w : far_m;
+    struct lumi_vec3 world = lumi_to_world(pose, lumi_vec3(tan_x * z, tan_y * z, z));
+    arrays->positions[3 * at] = (float)world.x;
+    arrays->positions[3 * at + 1] = (float)world.y;
+    arrays->positions[3 * at + 2] = (float)world.z;
+    arrays->texture[2 * at] = (float)(c.x / grid->width);
+    arrays->texture[2 * at + 1] = (float)(c.y / grid->height);
+    if (image) {
+        int x = c.x >= image->width ? image->width - 1 : (int)c.x;
+        int y = c.y >= image->height ? image->height - 1 : (int)c.y;
+        memcpy(arrays->colours + 3 * at, lumi_row_u8(image, y) + 3 * x, 3);
+    }
+}
+
+static void gather(const struct lumi_grid *grid, const struct lumi_pose *pose, const struct lumi_view_mesh *mesh,
+                   const struct lumi_raster *image, double far_m, const struct arrays *arrays)
+{
+    size_t vertex = 0, index = 0;
+
+    for (int i = 0; i < mesh->cols * mesh->rows; i++) {
+        const struct lumi_tile_mesh *tile = &mesh->tiles[i];
+        for (int t = 0; t < 3 * tile->triangle_count; t++)
+            arrays->indices[index++] = (uint32_t)(vertex + tile->indices[t]);
+        for (int v = 0; v < tile->vertex_count; v++)
+            place_vertex(grid, pose, image, corner_of(mesh, i, &tile->vertices[v]), far_m, arrays, vertex++);
+    }
+}
+
+int lumi_export_mesh(const char *path, const struct lumi_grid *grid, const struct lumi_pose *pose,
+                     const struct lumi_view_mesh *mesh, const struct lumi_raster *image, double far_m,
+                     struct lumi_error *error)
+{
+    struct lumi_ply ply = {.comment = "world coordinates in metres, +Z up; s, t from the image's top left"};
+    int code;
+
+    if (image && (image->sample != LUMI_U8 || image->channels != 3 || image->width != grid->width ||
+                  image->height != grid->height))
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: the image does not belong to the mesh", path);
+    for (int i = 0; i < mesh->cols * mesh->rows; i++) {
+        ply.vertex_count += mesh->tiles[i].vertex_count;
+        ply.triangle_count += mesh->tiles[i].triangle_count;
+    }
+    struct arrays arrays = {
+        lumi_alloc(ply.vertex_count, 3 * sizeof(float)), lumi_alloc(ply.vertex_count, 2 * sizeof(float)),
+        image ? lumi_alloc(ply.vertex_count, 3) : NULL, lumi_alloc(ply.triangle_count, 3 * sizeof(uint32_t))};
+    if (!arrays.positions || !arrays.texture || (image && !arrays.colours) || !arrays.indices) {
+        code = lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory to write it", path);
+        goto out;
+    }
+    gather(grid, pose, mesh, image, far_m, &arrays);
+    ply.positions = arrays.positions;
+    ply.texture = arrays.texture;
+    ply.colours = arrays.colours;
+    ply.indices = arrays.indices;
+    code = lumi_ply_write(path, &ply, error);
+out:
+    lumi_free(arrays.positions);
+    lumi_free(arrays.texture);
+    lumi_free(arrays.colours);
+    lumi_free(arrays.indices);
+    return code;
+}

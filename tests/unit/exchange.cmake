@@ -1,0 +1,2 @@
+lumi_test(test_exchange FOLDERS exchange capture image base)
+lumi_test(test_import FOLDERS exchange capture image base)
