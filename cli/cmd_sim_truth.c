@@ -5,7 +5,7 @@
 
 static char *out, *rig_text, *size_text, *format_text, *lens_text;
 static int random_count, seed = 1, threads;
-static double fov, scale = 1, volume;
+static double fov, scale = 1, volume, eye_distance;
 static gboolean no_depth, inward;
 
 static const GOptionEntry options[] = {
@@ -19,6 +19,8 @@ static const GOptionEntry options[] = {
     {"seed", 0, 0, G_OPTION_ARG_INT, &seed, "of the random views (1)", "S"},
     {"volume", 0, 0, G_OPTION_ARG_DOUBLE, &volume, "radius in metres within which random eyes are (0.6 of the rig's)",
      "R"},
+    {"stereo", 0, 0, G_OPTION_ARG_DOUBLE, &eye_distance,
+     "with --random, one view more: the right eye, so far from the first view, which is the left one", "METRES"},
     {"fov", 0, 0, G_OPTION_ARG_DOUBLE, &fov, "horizontal field of view in degrees", "DEGREES"},
     {"size", 0, 0, G_OPTION_ARG_STRING, &size_text, "size of the views in pixels", "WxH"},
     {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale, "shrinks a rig's counts and resolution (1)", "S"},
@@ -65,6 +67,7 @@ static int choose_views(struct sim_rig *views, struct lumi_error *error)
                                                : around.inward ? 40
                                                                : 75,
                                         .volume = volume,
+                                        .eye_distance = eye_distance,
                                         .seed = (uint64_t)seed};
     int code = sim_rig_random(&around, &random, views, error);
     sim_rig_finish(&around);

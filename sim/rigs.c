@@ -237,7 +237,9 @@ static void random_in_grid(const struct sim_rig *rig, uint64_t seed, int i, stru
 int sim_rig_random(const struct sim_rig *around, const struct sim_random_options *o, struct sim_rig *result,
                    struct lumi_error *error)
 {
-    *result = (struct sim_rig){.count = o->count, .rows = 1, .columns = o->count, .cameras = 1};
+    int count = o->count + (o->eye_distance > 0);
+
+    *result = (struct sim_rig){.count = count, .rows = 1, .columns = count, .cameras = 1};
     if (o->count < 1 || o->count > VIEWS_MAX || o->width < 1 || o->height < 1 || !(o->fov > 0 && o->fov < 179))
         return lumi_fail(error, LUMI_ERR_ARG, "random views: count, size or field of view out of range");
     LUMI_TRY(allocate(result, error));
@@ -250,6 +252,12 @@ int sim_rig_random(const struct sim_rig *around, const struct sim_random_options
             random_in_grid(around, o->seed, i, &view->pose);
         else
             random_in_ball(around, volume, o->seed, i, &view->pose);
+    }
+    if (o->eye_distance > 0) {
+        struct sim_view *right = &result->views[o->count];
+        *right = result->views[0];
+        right->column = right->position = o->count;
+        right->pose.t = lumi_add(right->pose.t, lumi_scale(lumi_axis(&right->pose, 0), o->eye_distance));
     }
     return LUMI_OK;
 }

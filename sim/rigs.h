@@ -56,7 +56,8 @@ void sim_rig_finish(struct sim_rig *rig);
  */
 struct sim_random_options {
     int count, width, height;
-    double fov, volume; /* degrees, metres */
+    double fov, volume;  /* degrees, metres */
+    double eye_distance; /* metres; above 0 one more view follows: the right eye where the first view is the left one */
     uint64_t seed;
 };
 int sim_rig_random(const struct sim_rig *around, const struct sim_random_options *options, struct sim_rig *result,
