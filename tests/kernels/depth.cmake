@@ -1,0 +1,1 @@
+lumi_test(test_depth_kernels FOLDERS depth lightfield base)
