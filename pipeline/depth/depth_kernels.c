@@ -35,7 +35,7 @@ static void sweep(const struct mvs_target *target, const float a[3], uint32_t co
     }
 }
 
-const struct mvs_kernels mvs_kernels_c = {sweep, path_step};
+const struct mvs_kernels mvs_kernels_c = {sweep, path_step, combine};
 
 const struct mvs_kernels *mvs_kernels(void)
 {

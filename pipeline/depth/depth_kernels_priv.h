@@ -29,4 +29,35 @@ static int path_step(const uint8_t *restrict cost, int16_t *restrict previous, i
     return minimum;
 }
 
+static inline void order(uint8_t *restrict a, uint8_t *restrict b, int planes)
+{
+    for (int k = 0; k < planes; k++) {
+        uint8_t low = a[k] < b[k] ? a[k] : b[k], high = a[k] < b[k] ? b[k] : a[k];
+        a[k] = low;
+        b[k] = high;
+    }
+}
+
+static void combine(uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], int best, int planes, uint8_t *restrict result)
+{
+    /* Batcher's odd-even merge network. */
+    static const uint8_t pairs[19][2] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {1, 2}, {5, 6},
+                                         {0, 4}, {1, 5}, {2, 6}, {3, 7}, {2, 4}, {3, 5}, {1, 2}, {3, 4}, {5, 6}};
+    uint16_t sum[MVS_PLANES_MAX] = {0}, valid[MVS_PLANES_MAX] = {0};
+
+    for (int i = 0; i < 19; i++)
+        order(cost[pairs[i][0]], cost[pairs[i][1]], planes);
+    for (int n = 0; n < best; n++)
+        for (int k = 0; k < planes; k++) {
+            uint16_t value = cost[n][k], counts = value != MVS_INVALID;
+            sum[k] = (uint16_t)(sum[k] + (counts ? value : 0));
+            valid[k] = (uint16_t)(valid[k] + counts);
+        }
+    for (int k = 0; k < planes; k++) {
+        uint16_t share = valid[k] == 4 ? 64 : valid[k] == 3 ? 85 : valid[k] == 2 ? 128 : 256;
+        uint16_t mean = (uint16_t)((uint16_t)(sum[k] * share) >> 8);
+        result[k] = (uint8_t)(valid[k] ? mean : MVS_COST_MAX / 2);
+    }
+}
+
 #endif

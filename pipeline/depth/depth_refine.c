@@ -12,7 +12,7 @@ enum { RADIUS = 6, BINS = 64, COLOURS = 766 };
 
 #define AGREE_PX 1.0f  /* two maps agree where they put a point so close together */
 #define EDGE_PX 1.5f   /* a pixel whose surroundings differ by more lies at an edge */
-#define COLOUR_FALL 24 /* sum of differences of R, G and B at which a pixel's say falls to 1/e */
+#define COLOUR_FALL 16 /* sum of differences of R, G and B at which a pixel's say falls to 1/e */
 
 /* A neighbour's map and the way into it. */
 struct confirmer {

@@ -14,41 +14,6 @@ struct volume_job {
     uint8_t *volume;
 };
 
-static void order(uint8_t *restrict a, uint8_t *restrict b, int planes)
-{
-    for (int k = 0; k < planes; k++) {
-        uint8_t low = a[k] < b[k] ? a[k] : b[k], high = a[k] < b[k] ? b[k] : a[k];
-        a[k] = low;
-        b[k] = high;
-    }
-}
-
-/* Sorts eight costs a plane (Batcher's odd-even merge network). */
-static void sort_costs(uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], int planes)
-{
-    static const uint8_t pairs[19][2] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {1, 2}, {5, 6},
-                                         {0, 4}, {1, 5}, {2, 6}, {3, 7}, {2, 4}, {3, 5}, {1, 2}, {3, 4}, {5, 6}};
-
-    for (int i = 0; i < 19; i++)
-        order(cost[pairs[i][0]], cost[pairs[i][1]], planes);
-}
-
-/* Mean of the `best` smallest costs, of those that are valid; where none is, a middling cost. */
-static void combine(uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], int best, int planes, uint8_t *result)
-{
-    static const uint16_t share[LUMI_MVS_NEIGHBOURS + 1] = {0, 256, 128, 85, 64, 51, 43, 37, 32};
-
-    for (int k = 0; k < planes; k++) {
-        int sum = 0, valid = 0;
-        for (int n = 0; n < best; n++) {
-            int counts = cost[n][k] != MVS_INVALID;
-            sum += counts * cost[n][k];
-            valid += counts;
-        }
-        result[k] = (uint8_t)(valid ? sum * share[valid] >> 8 : MVS_COST_MAX / 2);
-    }
-}
-
 static int volume_row(void *context, int y, int thread)
 {
     const struct volume_job *job = context;
@@ -67,8 +32,7 @@ static int volume_row(void *context, int y, int thread)
                 a[i] = r[3 * i] * image->tan_x[x] + r[3 * i + 1] * image->tan_y[y] + r[3 * i + 2];
             job->kernels->sweep(&job->targets[n], a, image->pixels[at], planes, cost[n]);
         }
-        sort_costs(cost, planes);
-        combine(cost, best, planes, job->volume + at * (size_t)planes);
+        job->kernels->combine(cost, best, planes, job->volume + at * (size_t)planes);
     }
     return LUMI_OK;
 }

@@ -58,6 +58,9 @@ struct mvs_kernels {
      * after its planes. planes: a multiple of 16. */
     int (*path)(const uint8_t *cost, int16_t *previous, int lowest, int p1, int p2, int planes, int16_t *path,
                 uint16_t *sum);
+    /* result[k]: the mean of the `best` (1..4) smallest costs of plane k, of those that are valid; where none is, a
+     * middling cost. Sorts `cost`. */
+    void (*combine)(uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], int best, int planes, uint8_t *result);
 };
 
 const struct mvs_kernels *mvs_kernels(void);

@@ -123,6 +123,31 @@ static void a_step_of_a_path_gives_the_numbers_of_plain_c(void **state)
     }
 }
 
+static void combining_neighbours_gives_the_numbers_of_plain_c(void **state)
+{
+    const struct mvs_kernels *mine = mvs_kernels();
+    bool seen[256] = {false};
+
+    (void)state;
+    for (int round = 0; round < ROUNDS; round++) {
+        uint8_t cost[2][LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], result[2][PLANES + GUARD];
+        const int invalid = (int)(random_bits() % 9), best = 1 + (int)(random_bits() % 4);
+        memset(result, 77, sizeof(result));
+        for (int n = 0; n < LUMI_MVS_NEIGHBOURS; n++)
+            for (int k = 0; k < PLANES; k++)
+                cost[0][n][k] = cost[1][n][k] =
+                    (int)(random_bits() % 8) < invalid ? MVS_INVALID : (uint8_t)(random_bits() % (MVS_COST_MAX + 1));
+        mvs_kernels_c.combine(cost[0], best, PLANES, result[0]);
+        mine->combine(cost[1], best, PLANES, result[1]);
+        assert_memory_equal(result[0], result[1], sizeof(result[0]));
+        for (int k = 0; k < PLANES; k++) {
+            assert_true(result[0][k] <= MVS_COST_MAX);
+            seen[result[0][k]] = true;
+        }
+    }
+    assert_true(seen[0] && seen[MVS_COST_MAX]);
+}
+
 static double seconds(void)
 {
     struct timespec time;
@@ -168,6 +193,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sweeping_a_pinhole_gives_the_numbers_of_plain_c),
         cmocka_unit_test(sweeping_a_tabled_lens_gives_the_numbers_of_plain_c),
+        cmocka_unit_test(combining_neighbours_gives_the_numbers_of_plain_c),
         cmocka_unit_test(a_step_of_a_path_gives_the_numbers_of_plain_c),
     };
 

@@ -54,4 +54,4 @@ static void sweep(const struct mvs_target *target, const float a[3], uint32_t co
     }
 }
 
-const struct mvs_kernels mvs_kernels_avx2 = {sweep, path_step};
+const struct mvs_kernels mvs_kernels_avx2 = {sweep, path_step, combine};

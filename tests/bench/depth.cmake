@@ -1,0 +1,2 @@
+add_executable(bench_depth bench_depth.c)
+target_link_libraries(bench_depth PRIVATE lumi_flags lumi_depth lumi_image lumi_lightfield lumi_base)
