@@ -3,9 +3,11 @@
 
 #include <math.h>
 
-/* Fills the pixels whose centres lie in the triangle, edges included. In pixels of the tile. */
+/* Fills the pixels whose centres lie in the triangle, edges included (with some slack, so that rounding leaves no pixel
+ * on an edge to neither side). In pixels of the tile. */
 static void fill(const double x[3], const double y[3], const double w[3], int left, int top, struct lumi_raster *out)
 {
+    const double slack = 1e-9;
     const double determinant = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
     const int y0 = (int)fmax(0, ceil(fmin(fmin(y[0], y[1]), y[2]) - 0.5));
     const int y1 = (int)fmin(out->height - 1 - top, floor(fmax(fmax(y[0], y[1]), y[2]) - 0.5));
@@ -19,7 +21,7 @@ static void fill(const double x[3], const double y[3], const double w[3], int le
             const double px = i + 0.5 - x[0], py = j + 0.5 - y[0];
             const double b = (px * (y[2] - y[0]) - (x[2] - x[0]) * py) / determinant;
             const double c = ((x[1] - x[0]) * py - px * (y[1] - y[0])) / determinant;
-            if (b >= 0 && c >= 0 && b + c <= 1)
+            if (b >= -slack && c >= -slack && b + c <= 1 + slack)
                 lumi_row_f32(out, top + j)[left + i] = (float)(w[0] + b * (w[1] - w[0]) + c * (w[2] - w[0]));
         }
 }

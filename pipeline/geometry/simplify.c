@@ -71,7 +71,7 @@ static bool pop(struct heap *heap, struct entry *entry)
 static void measure(struct surface *s, int t)
 {
     s->triangles[t].error = surface_triangle_error(s, s->triangles[t].v);
-    s->triangles[t].stamp++;
+    s->triangles[t].stamp = ++s->clock;
 }
 
 /* True if the circle through p, b, c holds q: the Delaunay criterion, exact on the lattice. */
@@ -235,7 +235,7 @@ static bool cheapest(struct surface *s, int v, struct star *star, int *u, float 
     return *cost < HUGE_VALF;
 }
 
-/* The sum of the stamps around a vertex: changes with every change there. */
+/* The sum of the stamps around a vertex: another after any change there, but for rare chance. */
 static unsigned star_stamp(const struct surface *s, const struct star *star)
 {
     unsigned sum = 0;
@@ -269,7 +269,7 @@ static void collapse_until(struct surface *s, int limit, struct heap *heap)
         const int v = entry.item, u = entry.other;
         if (s->vertices[v].triangle < 0 || !surface_star(s, v, &star))
             continue;
-        if (star_stamp(s, &star) != entry.stamp) {
+        if (star_stamp(s, &star) != entry.stamp || !surface_can_collapse(s, &star, v, u)) {
             queue_collapse(s, v, heap);
             continue;
         }

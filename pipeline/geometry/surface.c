@@ -114,7 +114,7 @@ static void set(struct surface *s, int t, int a, int b, int c, int na, int nb, i
 {
     struct surface_triangle *triangle = &s->triangles[t];
 
-    *triangle = (struct surface_triangle){{a, b, c}, {na, nb, nc}, tile, 0, triangle->stamp + 1};
+    *triangle = (struct surface_triangle){{a, b, c}, {na, nb, nc}, tile, 0, ++s->clock};
     s->vertices[a].triangle = s->vertices[b].triangle = s->vertices[c].triangle = t;
 }
 
@@ -251,7 +251,7 @@ void surface_collapse(struct surface *s, const struct star *star, int v, int u)
         struct surface_triangle *t = &s->triangles[index];
         if (t->v[(corner + 1) % 3] != u && t->v[(corner + 2) % 3] != u) {
             t->v[corner] = u;
-            t->stamp++;
+            t->stamp = ++s->clock;
             continue;
         }
         /* Dies: the triangles across its two edges that fall together become neighbours. */
@@ -266,7 +266,7 @@ void surface_collapse(struct surface *s, const struct star *star, int v, int u)
         s->alive--;
         s->tile_triangles[t->tile]--;
         t->tile = -1;
-        t->stamp++;
+        t->stamp = ++s->clock;
     }
     s->vertices[v].triangle = -1;
 }

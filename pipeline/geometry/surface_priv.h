@@ -13,10 +13,10 @@
 
 #include <stdbool.h>
 
-#define LATTICE 255               /* steps a tile */
-#define PIXEL (64.0 / LATTICE)    /* pixels a step */
-#define TILE_TRIANGLES_LIMIT 1000 /* no tile takes more, however bad the others think it is */
-#define STAR_LIMIT 128            /* triangles around a vertex, at most */
+#define LATTICE 255              /* steps a tile */
+#define PIXEL (64.0 / LATTICE)   /* pixels a step */
+#define TILE_TRIANGLES_LIMIT 800 /* no tile takes more, however bad the others think it is */
+#define STAR_LIMIT 128           /* triangles around a vertex, at most */
 
 struct surface_vertex {
     int x, y;
@@ -29,7 +29,7 @@ struct surface_triangle {
     int n[3]; /* neighbour across the edge opposite v[i], −1 at the image's edge */
     int tile; /* −1: removed */
     float error;
-    unsigned stamp; /* raised by every change */
+    unsigned stamp; /* the surface's clock at its last change */
 };
 
 struct surface {
@@ -43,7 +43,8 @@ struct surface {
     struct surface_triangle *triangles;
     int *tile_triangles;
     int vertex_count, triangle_count, vertex_limit, triangle_limit;
-    int alive; /* triangles that are not removed */
+    int alive;      /* triangles that are not removed */
+    unsigned clock; /* counts changes */
 };
 
 /* The triangles around a vertex and its place in each. */

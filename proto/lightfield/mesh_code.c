@@ -3,15 +3,17 @@
  *   u8   form: 0 plain, 1 compact
  *   f32  w_min, f32 w_step
  *   plain: for each tile its vertex count and triangle count (varints); then for each tile u8 shift, u16 base, three
- *          bytes a vertex (s, t, d), a varint an index. */
+ *          bytes a vertex (s, t, d), a varint an index.
+ *   compact: mesh_compact.c */
 #include "proto/lightfield/mesh.h"
 
 #include "proto/base/memory.h"
 #include "proto/lightfield/grid.h"
+#include "proto/lightfield/mesh_compact.h"
 
 #include <math.h>
 
-enum { FORM_PLAIN = 0 };
+enum { FORM_PLAIN = 0, FORM_COMPACT = 1 };
 
 static void encode_plain(const struct lumi_view_mesh *mesh, struct lumi_writer *writer)
 {
@@ -35,9 +37,14 @@ static void encode_plain(const struct lumi_view_mesh *mesh, struct lumi_writer *
 
 void lumi_view_mesh_encode(const struct lumi_view_mesh *mesh, struct lumi_writer *writer)
 {
-    lumi_write_u8(writer, FORM_PLAIN);
+    const size_t start = writer->size;
+
+    lumi_write_u8(writer, FORM_COMPACT);
     lumi_write_f32(writer, mesh->w_min);
     lumi_write_f32(writer, mesh->w_step);
+    if (writer->failed || lumi_mesh_compact_encode(mesh, writer))
+        return;
+    writer->data[start] = FORM_PLAIN;
     encode_plain(mesh, writer);
 }
 
@@ -109,17 +116,23 @@ int lumi_view_mesh_decode(struct lumi_reader *reader, int cols, int rows, struct
         return lumi_fail(error, LUMI_ERR_ARG, "mesh: %d × %d tiles", cols, rows);
     uint8_t form = lumi_read_u8(reader);
     float w_min = lumi_read_f32(reader), w_step = lumi_read_f32(reader);
-    if (reader->failed || form != FORM_PLAIN)
+    if (reader->failed || form > FORM_COMPACT)
         return lumi_fail(error, LUMI_ERR_FORMAT, "mesh: not a mesh");
     if (!isfinite(w_min) || !isfinite(w_step) || w_min < 0 || w_step < 0)
         return lumi_fail(error, LUMI_ERR_FORMAT, "mesh: a range of depth that is none");
-    int result = create_plain(reader, cols, rows, mesh, error);
+    int result;
+    if (form == FORM_COMPACT) {
+        result = lumi_mesh_compact_decode(reader, cols, rows, mesh, error);
+    } else {
+        result = create_plain(reader, cols, rows, mesh, error);
+        if (result == LUMI_OK)
+            result = decode_plain(reader, mesh, error);
+        if (result != LUMI_OK)
+            lumi_view_mesh_finish(mesh);
+    }
     if (result == LUMI_OK) {
         mesh->w_min = w_min;
         mesh->w_step = w_step;
-        result = decode_plain(reader, mesh, error);
     }
-    if (result != LUMI_OK)
-        lumi_view_mesh_finish(mesh);
     return result;
 }

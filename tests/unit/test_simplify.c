@@ -245,6 +245,40 @@ static void the_same_depth_gives_the_same_bytes(void **state)
     lumi_writer_finish(&writers[1]);
 }
 
+static void a_view_survives_its_coding_in_few_bytes(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        static const int sizes[][2] = {{320, 256}, {300, 250}, {65, 1}};
+        struct lumi_raster depth, dense, again;
+        struct lumi_view_mesh mesh, back;
+        struct lumi_writer writer;
+        struct lumi_reader reader;
+        struct lumi_error error;
+        simplify(clutter, sizes[k][0], sizes[k][1], 10, &depth, &mesh);
+        lumi_writer_init(&writer);
+        lumi_view_mesh_encode(&mesh, &writer);
+        assert_int_equal(writer.data[0], 1); /* the compact form */
+        assert_true(writer.size < 30u + 22u * (size_t)(mesh.cols * mesh.rows));
+        lumi_reader_init(&reader, writer.data, writer.size);
+        assert_int_equal(lumi_view_mesh_decode(&reader, mesh.cols, mesh.rows, &back, &error), LUMI_OK);
+        assert_covers(&back, sizes[k][0], sizes[k][1]);
+        assert_no_cracks(&back);
+        assert_int_equal(triangles_of(&back), triangles_of(&mesh));
+        assert_int_equal(lumi_mesh_rasterize(&mesh, depth.width, depth.height, &dense), LUMI_OK);
+        assert_int_equal(lumi_mesh_rasterize(&back, depth.width, depth.height, &again), LUMI_OK);
+        for (int y = 0; y < depth.height; y++)
+            for (int x = 0; x < depth.width; x++)
+                assert_true(fabsf(lumi_row_f32(&dense, y)[x] - lumi_row_f32(&again, y)[x]) < 1e-5f);
+        lumi_writer_finish(&writer);
+        lumi_view_mesh_finish(&mesh);
+        lumi_view_mesh_finish(&back);
+        lumi_raster_finish(&dense);
+        lumi_raster_finish(&again);
+        lumi_raster_finish(&depth);
+    }
+}
+
 static void nonsense_in_a_depth_map_becomes_infinity(void **state)
 {
     struct lumi_simplify_options options;
@@ -312,6 +346,7 @@ int main(void)
         cmocka_unit_test(a_step_is_kept_as_a_step),
         cmocka_unit_test(more_triangles_mean_less_error),
         cmocka_unit_test(the_same_depth_gives_the_same_bytes),
+        cmocka_unit_test(a_view_survives_its_coding_in_few_bytes),
         cmocka_unit_test(nonsense_in_a_depth_map_becomes_infinity),
         cmocka_unit_test(half_resolution_keeps_steps_and_directions),
     };
