@@ -4,15 +4,17 @@
 #define DIRECTIONS 64
 #define AREA_POINTS 6 /* a side */
 
-/* What light leaves a point that was hit, towards wherever: its mean colour under the sun and the ambient light. */
-static struct sim_v3 rough_radiance(const struct sim_scene *scene, const struct sim_ray *ray, const struct sim_hit *hit)
+/* What light leaves a point that was hit, towards wherever: its mean colour under the sun and the ambient light. Things
+ * that shine count where they are asked for as a light of the scene only, lest small ones make spots. */
+static struct sim_v3 rough_radiance(const struct sim_scene *scene, const struct sim_ray *ray, const struct sim_hit *hit,
+                                    bool emission)
 {
     if (hit->triangle < 0)
         return sim_sky_radiance(&scene->sky, ray->direction, 0.2f, 0.1f, false);
     const struct sim_material *m = &scene->materials[scene->triangle_material[hit->triangle]];
     struct sim_v3 point = v3_along(ray->origin, ray->direction, hit->distance);
     struct sim_v3 light = v3_add(scene->sky.ambient, sim_sun_light(scene, point, hit->face, hit->face, m->thin, 0));
-    return v3_add(v3_mul(sim_texture_mean(m), light), m->emission);
+    return v3_along(v3_mul(sim_texture_mean(m), light), m->emission, emission ? 1 : 0);
 }
 
 /* Points of the unit square, a Fibonacci lattice: even, and without rows. */
@@ -57,7 +59,7 @@ static struct sim_v3 from_around(const struct sim_scene *scene, struct sim_v3 p,
         ray.direction = v3_along(v3_along(ray.direction, u, r * cosf(angle)), v, r * sinf(angle));
         sim_trace(scene, &ray, 1e-4f, &hit);
         if (!through_light(scene, p, ray.direction, hit.distance))
-            sum = v3_add(sum, rough_radiance(scene, &ray, &hit));
+            sum = v3_add(sum, rough_radiance(scene, &ray, &hit, false));
     }
     return v3_scale(sum, 1.0f / DIRECTIONS);
 }
@@ -83,7 +85,7 @@ static struct sim_v3 from_light(const struct sim_scene *scene, const struct sim_
             continue;
         /* Close to the light the points stand for too much; the area of one of them bounds what it gives. */
         float solid = part * other / (distance * distance + part / (float)LUMI_PI);
-        sum = v3_along(sum, rough_radiance(scene, &ray, &hit), cosine * solid / (float)LUMI_PI);
+        sum = v3_along(sum, rough_radiance(scene, &ray, &hit, true), cosine * solid / (float)LUMI_PI);
     }
     return sum;
 }

@@ -110,7 +110,7 @@ static void shell(struct sim_scene *s, const struct shared *m)
     /* Roof lights of frosted glass between the beams. */
     struct sim_material frosted;
     sim_material_init(&frosted);
-    frosted.emission = v3(2.6f, 2.7f, 2.8f);
+    frosted.emission = v3(3.2f, 3.3f, 3.4f);
     int glass = sim_scene_material(s, &frosted);
     const float roof[2][4] = {{-0.62f, 0.3f, 0.52f, 1.9f}, {0.82f, -2.3f, 1.9f, -0.7f}};
     for (int i = 0; i < 2; i++) {
@@ -121,6 +121,10 @@ static void shell(struct sim_scene *s, const struct shared *m)
         sim_box(s, v3(r[0] - t, r[3], Z1 - 0.04f), v3(r[2] + t, r[3] + t, Z1), 0.1f, m->white);
         sim_box(s, v3(r[0] - t, r[1], Z1 - 0.04f), v3(r[0], r[3], Z1), 0.1f, m->white);
         sim_box(s, v3(r[2], r[1], Z1 - 0.04f), v3(r[2] + t, r[3], Z1), 0.1f, m->white);
+        for (int k = 1; k < 4; k++) {
+            float y = r[1] + (r[3] - r[1]) * 0.25f * (float)k;
+            sim_box(s, v3(r[0], y - 0.012f, Z1 - 0.035f), v3(r[2], y + 0.012f, Z1 - 0.015f), 0.1f, m->white);
+        }
     }
     const float hole_y[4] = {4.0f, 0.85f, 5.7f, 2.25f}; /* along +x from X0: 1.1 … 2.8 */
     const float hole_x[4] = {1.6f, 0.75f, 3.5f, 2.3f};  /* along −y from Y1: 1.8 … −0.1 */
@@ -330,7 +334,7 @@ static void build(struct sim_scene *s)
                               .sun_direction = v3_unit(v3(0.80f, 0.12f, 0.52f)),
                               .sun = {2.6f, 2.35f, 1.95f},
                               .sun_radius = 0.006f,
-                              .ambient = {0.34f, 0.33f, 0.31f},
+                              .ambient = {0.44f, 0.425f, 0.40f},
                               .seed = 9};
     make_shared(s, &m);
     shell(s, &m);

@@ -155,7 +155,7 @@ static struct sim_v3 brick(const struct sim_material *m, struct sim_v3 at, float
     float gap_x = 0.010f / m->cell[0], gap_y = 0.010f / m->cell[1];
     float inside = covered(x, gap_x, 1, footprint / m->cell[0]) * covered(y, gap_y, 1, footprint / m->cell[1]);
     float tone = resolved(m->cell[1], footprint) * (sim_hash(column, row, m->seed) - 0.5f);
-    float hue = resolved(m->cell[1], footprint) * sim_hash(column, row, m->seed + 1);
+    float hue = 0.5f + resolved(m->cell[1], footprint) * (sim_hash(column, row, m->seed + 1) - 0.5f);
     struct sim_v3 stone = v3_scale(v3_mix(m->color, m->color3, 0.7f * hue), 1 + 0.5f * tone);
     return v3_mix(m->color2, stone, inside);
 }

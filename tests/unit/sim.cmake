@@ -1,0 +1,5 @@
+lumi_test(test_sim_texture FOLDERS sim)
+lumi_test(test_sim_camera FOLDERS sim)
+lumi_test(test_sim_sensor FOLDERS sim)
+lumi_test(test_sim_rigs FOLDERS sim)
+lumi_test(test_sim_shoot FOLDERS sim capture image)

@@ -1,0 +1,148 @@
+/* Captures and truth folders of a simulated place. */
+#include "proto/base/memory.h"
+#include "proto/capture/capture.h"
+#include "proto/image/image.h"
+#include "sim/place.h"
+#include "sim/shoot.h"
+
+#include <glib.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct fixture {
+    char *dir;
+    struct sim_scene *scene;
+};
+
+static int set_up(void **state)
+{
+    static struct fixture f;
+
+    f.dir = g_dir_make_tmp("lumi-sim-XXXXXX", NULL);
+    if (!f.dir || sim_place_open("object", &f.scene, NULL) != LUMI_OK)
+        return 1;
+    *state = &f;
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    struct fixture *f = *state;
+    const char *argv[] = {"rm", "-rf", f->dir, NULL};
+
+    sim_scene_destroy(f->scene);
+    g_spawn_sync(NULL, (char **)(void *)argv, NULL, G_SPAWN_SEARCH_PATH, NULL, NULL, NULL, NULL, NULL, NULL);
+    g_free(f->dir);
+    return 0;
+}
+
+static void make_rig(struct sim_rig *rig, const char *text)
+{
+    struct sim_rig_options options;
+
+    sim_rig_options_init(&options);
+    options.width = 32;
+    options.height = 24;
+    options.scale = strncmp(text, "bar", 3) ? 1 : 0.1;
+    assert_int_equal(sim_rig_init(rig, text, &options, NULL), LUMI_OK);
+}
+
+static void a_capture_holds_every_frame_with_its_true_pose(void **state)
+{
+    struct fixture *f = *state;
+    const char *const rigs[] = {"planar:2x3:0.05", "bar2"};
+
+    for (int k = 0; k < 2; k++) {
+        g_autofree char *path = g_strdup_printf("%s/capture%d", f->dir, k);
+        g_autofree char *depth = g_strdup_printf("%s/depth%d", f->dir, k);
+        struct sim_rig rig;
+        struct sim_output output;
+        struct lumi_capture *capture;
+        struct lumi_capture_frame *frames;
+        struct lumi_error error = {0};
+        int count;
+        char meta[64];
+        make_rig(&rig, rigs[k]);
+        sim_output_init(&output);
+        output.depth_dir = depth;
+        output.threads = 2;
+        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, path, &error), LUMI_OK);
+        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, path, &error), LUMI_ERR_EXISTS);
+        assert_int_equal(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, &error), LUMI_OK);
+        assert_int_equal(lumi_capture_get_meta(capture, "surface", meta, sizeof meta, &error), LUMI_OK);
+        assert_string_equal(meta, k ? "sphere" : "plane");
+        assert_int_equal(lumi_capture_frames(capture, LUMI_FRAMES_USABLE, &frames, &count, &error), LUMI_OK);
+        assert_int_equal(count, rig.count);
+        for (int i = 0; i < count; i++) {
+            const struct sim_view *view = &rig.views[i];
+            assert_true(frames[i].has_pose && frames[i].pose_source == LUMI_POSE_TRUE);
+            for (int d = 0; d < 9; d++)
+                assert_true(fabs(frames[i].pose.r[d] - view->pose.r[d]) < 1e-12);
+            assert_true(lumi_length(lumi_sub(frames[i].pose.t, view->pose.t)) < 1e-12);
+            assert_int_equal(frames[i].row, view->row);
+            assert_int_equal(frames[i].column, view->column);
+            assert_true(frames[i].lens.fx == view->lens.fx && frames[i].lens.model == view->lens.model);
+            g_autofree char *exr = g_strdup_printf("%s/%s.exr", depth, frames[i].name);
+            struct lumi_raster z;
+            assert_int_equal(lumi_image_read_channel(exr, "Z", &z, &error), LUMI_OK);
+            assert_int_equal(z.width, 32);
+            lumi_raster_finish(&z);
+        }
+        lumi_free(frames);
+        lumi_capture_close(capture);
+        sim_rig_finish(&rig);
+    }
+}
+
+static void truth_writes_the_bytes_again_for_any_number_of_threads(void **state)
+{
+    struct fixture *f = *state;
+    char *json[2], *png[2];
+    gsize json_size[2], png_size[2];
+
+    for (int k = 0; k < 2; k++) {
+        g_autofree char *dir = g_strdup_printf("%s/truth%d", f->dir, k);
+        g_autofree char *poses = g_strdup_printf("%s/transforms.json", dir);
+        g_autofree char *image = g_strdup_printf("%s/images/r01c02.png", dir);
+        struct sim_rig rig;
+        struct sim_output output;
+        struct lumi_error error = {0};
+        make_rig(&rig, "planar:2x3:0.05");
+        sim_output_init(&output);
+        output.depth = true;
+        output.threads = 1 + 3 * k;
+        output.sensor.full_well = 3000;
+        output.sensor.bits = 12;
+        assert_int_equal(sim_truth_write(f->scene, &rig, &output, dir, &error), LUMI_OK);
+        assert_int_equal(sim_truth_write(f->scene, &rig, &output, dir, &error), LUMI_ERR_EXISTS);
+        assert_true(g_file_get_contents(poses, &json[k], &json_size[k], NULL));
+        assert_true(g_file_get_contents(image, &png[k], &png_size[k], NULL));
+        sim_rig_finish(&rig);
+    }
+    assert_string_equal(json[0], json[1]);
+    assert_int_equal(png_size[0], png_size[1]);
+    assert_memory_equal(png[0], png[1], png_size[0]);
+    struct lumi_image_info info;
+    assert_int_equal(lumi_image_info_memory(png[0], png_size[0], "r01c02.png", &info, NULL), LUMI_OK);
+    assert_int_equal(info.sample, LUMI_U16);
+    /* The first camera: left and above the middle, its y up and z backward in the file. */
+    assert_non_null(strstr(json[0], "[[1, 0, 0, -0.05"));
+    assert_non_null(strstr(json[0], "[0, 0, -1, 0], [0, 1, 0, 0.025"));
+    for (int k = 0; k < 2; k++) {
+        g_free(json[k]);
+        g_free(png[k]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_capture_holds_every_frame_with_its_true_pose),
+        cmocka_unit_test(truth_writes_the_bytes_again_for_any_number_of_threads),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
