@@ -4,7 +4,7 @@
 
 #include "render/cpu/picture.h"
 #include "render/cpu/rays.h"
-#include "render/cpu/shade.h"
+#include "render/cpu/view_shade.h"
 
 int lumi_sums_create(struct lumi_sums *sums, size_t pixels, struct lumi_error *error);
 void lumi_sums_finish(struct lumi_sums *sums);

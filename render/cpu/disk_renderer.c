@@ -4,7 +4,7 @@
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
 #include "render/cpu/compose.h"
-#include "render/cpu/shade.h"
+#include "render/cpu/view_shade.h"
 
 #include <string.h>
 
@@ -33,7 +33,7 @@ struct render {
 void lumi_disk_settings_default(struct lumi_disk_settings *settings)
 {
     *settings = (struct lumi_disk_settings){
-        .kernel = -1, .disk_scale = 1, .filter = LUMI_FILTER_CUBIC, .stretch = 0.5f, .sample = LUMI_U8};
+        .kernel = -1, .disk_scale = 1, .filter = LUMI_FILTER_CUBIC, .stretch = 1, .sample = LUMI_U8};
 }
 
 static int check_settings(const struct lumi_disk_settings *s, struct lumi_error *error)

@@ -4,7 +4,7 @@
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
 #include "render/cpu/compose.h"
-#include "render/cpu/shade.h"
+#include "render/cpu/view_shade.h"
 
 #include <float.h>
 #include <string.h>

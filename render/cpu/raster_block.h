@@ -2,7 +2,7 @@
 #ifndef LUMI_RENDER_CPU_RASTER_BLOCK_H
 #define LUMI_RENDER_CPU_RASTER_BLOCK_H
 
-#include "render/cpu/surface.h"
+#include "render/cpu/view_surface.h"
 
 /* What a pixel remembers of the triangle it shows. */
 struct lumi_triangle_record {

@@ -1,1 +1,1 @@
-lumi_test(test_depth FOLDERS depth lightfield base LABELS threads)
+lumi_test(test_depth FOLDERS depth lightfield base LABELS threads TSAN_CASES "*thread*")

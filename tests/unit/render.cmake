@@ -1,1 +1,2 @@
 lumi_test(test_disk_renderer FOLDERS cpu viewset lightfield base LABELS threads)
+lumi_test(test_metrics FOLDERS evaluate lightfield base LABELS threads)

@@ -187,6 +187,7 @@ static void a_coarser_view_averages_instead_of_aliasing(void **state)
         for (int i = 24; i < 3 * 248; i++)
             assert_true(fabsf(lumi_row_f32(&view, y)[i] - 0.5f) < 0.02f);
     lumi_raster_finish(&image);
+    lumi_raster_finish(&view);
     image.width = 3;
     assert_int_equal(lumi_warp_apply(warp, &image, &view, &error), LUMI_ERR_ARG);
     lumi_warp_destroy(warp);

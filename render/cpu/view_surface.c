@@ -1,5 +1,5 @@
 /* A view's surface as the eye sees it. */
-#include "render/cpu/surface.h"
+#include "render/cpu/view_surface.h"
 
 #include "proto/base/memory.h"
 

@@ -1,5 +1,5 @@
 /* From the surface a ray meets in a view to the view's colour and weight. */
-#include "render/cpu/shade.h"
+#include "render/cpu/view_shade.h"
 
 #include <math.h>
 #include <pthread.h>

@@ -1,6 +1,6 @@
 /* From the surface a ray meets in a view to the view's colour and weight. */
-#ifndef LUMI_RENDER_CPU_SHADE_H
-#define LUMI_RENDER_CPU_SHADE_H
+#ifndef LUMI_RENDER_CPU_VIEW_SHADE_H
+#define LUMI_RENDER_CPU_VIEW_SHADE_H
 
 #include "render/cpu/disk_renderer.h"
 #include "render/cpu/raster_block.h"

@@ -4,8 +4,8 @@
  *    infinity, w = 0, is a vertex like any other).
  * 2. Vertices that two patches share come out the same to the bit; with the canonical edge order of triangle.c no pixel
  *    between neighbouring triangles is drawn twice or not at all. */
-#ifndef LUMI_RENDER_CPU_SURFACE_H
-#define LUMI_RENDER_CPU_SURFACE_H
+#ifndef LUMI_RENDER_CPU_VIEW_SURFACE_H
+#define LUMI_RENDER_CPU_VIEW_SURFACE_H
 
 #include "render/cpu/rays.h"
 #include "render/viewset/viewset.h"

@@ -1,0 +1,86 @@
+/* lumi eval: a field against the truth. */
+#include "cli/command.h"
+#include "cli/render_options.h"
+#include "pipeline/evaluate/codec_cost.h"
+#include "pipeline/evaluate/evaluate.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static struct cli_render_options shared;
+static char *truth_file, *frames_regex, *difference, *sheet, *codec;
+static int sheet_views = 12;
+static gboolean json;
+
+static const GOptionEntry options[] = {
+    {"truth", 't', 0, G_OPTION_ARG_FILENAME, &truth_file, "pictures with poses and lenses: a transforms.json", "FILE"},
+    {"frames", 0, 0, G_OPTION_ARG_STRING, &frames_regex, "only those whose names this regex matches", "REGEX"},
+    {"difference", 0, 0, G_OPTION_ARG_FILENAME, &difference, "write 4 × the absolute difference of every view here",
+     "DIR"},
+    {"sheet", 0, 0, G_OPTION_ARG_FILENAME, &sheet, "contact sheet: truth, rendering, difference", "PNG"},
+    {"sheet-views", 0, 0, G_OPTION_ARG_INT, &sheet_views, "views on it, at most (12)", "N"},
+    {"codec", 0, 0, G_OPTION_ARG_FILENAME, &codec,
+     "instead: what compression alone cost, against the views before coding in this capture's work folder", "CAPTURE"},
+    {"json", 0, 0, G_OPTION_ARG_NONE, &json, "machine-readable", NULL},
+    CLI_RENDER_OPTIONS(shared),
+    {0},
+};
+
+static void progress(void *context, const char *what, int done, int total)
+{
+    (void)context;
+    cli_progress(what, done, total);
+}
+
+static int run_codec(const char *field, struct lumi_error *error)
+{
+    struct lumi_codec_cost cost;
+
+    LUMI_TRY(lumi_codec_cost(field, codec, shared.threads, progress, NULL, &cost, error));
+    cli_progress_end();
+    g_autofree char *text = json ? lumi_codec_cost_json(&cost) : lumi_codec_cost_text(&cost);
+    printf("%s%s", text, json ? "\n" : "");
+    lumi_codec_cost_finish(&cost);
+    return LUMI_OK;
+}
+
+static int run(int argc, char **argv, struct lumi_error *error)
+{
+    struct lumi_evaluate_options o = {
+        .difference = difference, .sheet = sheet, .sheet_views = sheet_views, .progress = progress};
+    struct lumi_evaluation evaluation;
+    struct lumi_truth_set truth;
+
+    (void)argc;
+    if (!!truth_file + !!codec != 1)
+        return lumi_fail(error, LUMI_ERR_ARG, "one of --truth FILE and --codec CAPTURE is wanted");
+    if (codec)
+        return run_codec(argv[0], error);
+    LUMI_TRY(cli_render_options_apply(&shared, &o.render, error));
+    LUMI_TRY(lumi_truth_read(truth_file, frames_regex, &truth, error));
+    int code = lumi_evaluate(argv[0], &truth, &o, &evaluation, error);
+    if (code == LUMI_OK) {
+        cli_progress_end();
+        g_autofree char *text = json ? lumi_evaluation_json(&evaluation) : lumi_evaluation_text(&evaluation);
+        printf("%s%s", text, json ? "\n" : "");
+        lumi_evaluation_finish(&evaluation);
+    }
+    lumi_truth_finish(&truth);
+    return code;
+}
+
+const struct cli_command cli_eval = {
+    .name = "eval",
+    .arguments = "FILE --truth TRANSFORMS",
+    .summary = "compare rendered views with the truth",
+    .description = "Renders the truth's views with their own lenses and sizes. For each, the mean and the worst: PSNR "
+                   "of RGB; PSNR of "
+                   "YUV 4:2:0 as Overbeck et al. 2018, section 8.2, define it; SSIM of luma (Wang et al. 2004); the "
+                   "share of pixels "
+                   "that no view covers. Uncovered pixels count as black.\n\n"
+                   "With --method plane and no --plane-distance the best single plane is searched for first.",
+    .options = options,
+    .min_arguments = 1,
+    .max_arguments = 1,
+    .run = run,
+};
