@@ -1,1 +1,2 @@
 lumi_test(test_capture FOLDERS capture mechanism base)
+lumi_test(test_rig FOLDERS mechanism base)
