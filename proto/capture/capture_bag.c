@@ -128,6 +128,8 @@ static int close_database(struct lumi_capture *capture, struct lumi_error *error
     capture->writable = false;
     sqlite3_close(capture->db);
     capture->db = NULL;
+    /* Left by a process killed while it began a journal; SQLite ignores it, a bag must not hold it. */
+    unlinkat(capture->dir_fd, CAPTURE_DB "-journal", 0);
     char *path = lumi_capture_join(capture, CAPTURE_DB);
     if (!path)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", capture->path);

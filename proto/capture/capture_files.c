@@ -14,24 +14,10 @@
 
 #define COPY_BUFFER ((size_t)1 << 18)
 
-static long long write_budget = -1;
-
-void capture_fail_writes_after(long long bytes)
-{
-    write_budget = bytes;
-}
-
 static int write_all(int fd, const void *data, size_t size)
 {
     const char *at = data;
 
-    if (write_budget >= 0) {
-        if ((long long)size > write_budget) {
-            errno = ENOSPC;
-            return -1;
-        }
-        write_budget -= (long long)size;
-    }
     while (size > 0) {
         ssize_t done = write(fd, at, size);
         if (done < 0 && errno == EINTR)

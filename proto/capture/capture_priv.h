@@ -87,9 +87,6 @@ int capture_remove_tree(const char *path, struct lumi_error *error);
 /* SHA-256 in hexadecimal. */
 void capture_digest_hex(struct sha256_ctx *context, char hex[65]);
 
-/* Tests: the write that would take the bytes written beyond `bytes` fails with "no space left"; negative: none does. */
-void capture_fail_writes_after(long long bytes);
-
 /* ---- capture_bag.c ---- */
 
 int capture_unseal(struct lumi_capture *capture, struct lumi_error *error);

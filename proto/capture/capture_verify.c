@@ -361,9 +361,15 @@ static int advance(void *context, int64_t bytes)
     return check->progress ? check->progress(check->context, check->done, check->total) : 0;
 }
 
+/* The database and what SQLite keeps beside it while it is open. */
 static bool live_file(const char *path)
 {
-    return !strcmp(path, CAPTURE_DB) || !strcmp(path, CAPTURE_DB "-wal") || !strcmp(path, CAPTURE_DB "-shm");
+    const char *const files[] = {CAPTURE_DB, CAPTURE_DB "-wal", CAPTURE_DB "-shm", CAPTURE_DB "-journal"};
+
+    for (int i = 0; i < 4; i++)
+        if (!strcmp(path, files[i]))
+            return true;
+    return false;
 }
 
 static int check_item(struct check *check, const struct item *item)

@@ -35,6 +35,18 @@
             fail_msg("%s: code %d, text '%s'", #call, code_, error->text);                                             \
     } while (0)
 
+/* Runs a shell command that must succeed. */
+__attribute__((format(printf, 1, 2))) static inline void shell(const char *format, ...)
+{
+    char command[4 * PATH_SIZE];
+    va_list args;
+
+    va_start(args, format);
+    vsnprintf(command, sizeof command, format, args);
+    va_end(args);
+    assert_int_equal(system(command), 0);
+}
+
 static inline int scratch_setup(void **state)
 {
     char *folder = malloc(PATH_SIZE);
@@ -47,22 +59,25 @@ static inline int scratch_setup(void **state)
 
 static inline int scratch_teardown(void **state)
 {
-    char command[PATH_SIZE + 16];
-
-    snprintf(command, sizeof command, "rm -rf '%s'", (char *)*state);
-    int status = system(command);
+    shell("chmod -R u+w '%s' && rm -rf '%s'", (char *)*state, (char *)*state);
     free(*state);
-    return status;
+    return 0;
 }
 
+/* A path in the scratch folder; stays valid for the program's life. */
 static inline const char *in_scratch(void **state, const char *name)
 {
-    static char path[4][PATH_SIZE];
-    static int next;
-    char *text = path[next++ % 4];
+    static char paths[128][PATH_SIZE];
+    static int count;
+    char path[PATH_SIZE];
 
-    snprintf(text, PATH_SIZE, "%.400s/%.100s", (char *)*state, name);
-    return text;
+    snprintf(path, PATH_SIZE, "%.400s/%.100s", (char *)*state, name);
+    for (int i = 0; i < count; i++)
+        if (!strcmp(paths[i], path))
+            return paths[i];
+    assert_in_range(count, 0, 127);
+    memcpy(paths[count], path, PATH_SIZE);
+    return paths[count++];
 }
 
 static inline struct lumi_capture_lens small_lens(void)
@@ -126,11 +141,17 @@ static inline int64_t store_frame(struct lumi_capture *capture, int64_t camera, 
     return id;
 }
 
+static inline void print_problem(void *context, const char *file, const char *text)
+{
+    (void)context;
+    fprintf(stderr, "%s: %s\n", file, text);
+}
+
 static inline int problems_of(const char *path)
 {
     struct lumi_verify_result result;
 
-    OK(lumi_capture_verify(path, NULL, NULL, NULL, &result, error));
+    OK(lumi_capture_verify(path, print_problem, NULL, NULL, &result, error));
     return result.problems;
 }
 
