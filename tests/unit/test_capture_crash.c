@@ -5,6 +5,7 @@
 #include "tests/unit/capture_fixture.h"
 
 #include "proto/base/memory.h"
+#include "proto/capture/capture_priv.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -306,7 +307,11 @@ static void recover(const char *path, const struct heard *heard)
 
 static void remove_path(const char *path)
 {
-    shell("rm -rf '%s' '%s.partial'", path, path);
+    char partial[PATH_SIZE + 16];
+
+    snprintf(partial, sizeof partial, "%.500s.partial", path);
+    capture_remove_tree(path, NULL);
+    capture_remove_tree(partial, NULL);
 }
 
 static void what_was_acknowledged_survives_a_kill_at_any_moment(void **state)
