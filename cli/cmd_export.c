@@ -1,10 +1,12 @@
-/* lumi export: a capture's cameras and poses for other programs. */
+/* lumi export: cameras, poses, depth and meshes for other programs. */
 #include "cli/command.h"
 
 #include "pipeline/exchange/exchange.h"
+#include "pipeline/exchange/export_view.h"
 
-static char *transforms, *colmap;
+static char *transforms, *colmap, *view, *depth, *mesh, *work;
 static gboolean text, original_names;
+static double far_m = 1000;
 
 static const GOptionEntry options[] = {
     {"transforms", 0, 0, G_OPTION_ARG_FILENAME, &transforms, "write nerfstudio's transforms.json there", "FILE"},
@@ -12,27 +14,44 @@ static const GOptionEntry options[] = {
     {"text", 0, 0, G_OPTION_ARG_NONE, &text, "the COLMAP model as text, not binary", NULL},
     {"original-names", 0, 0, G_OPTION_ARG_NONE, &original_names,
      "name pictures as their source did, not by the capture's files", NULL},
+    {"view", 0, 0, G_OPTION_ARG_STRING, &view, "the view that --depth and --mesh are of", "NAME|NUMBER"},
+    {"depth", 0, 0, G_OPTION_ARG_FILENAME, &depth, "write the view's depth in metres (OpenEXR, channel Z)", "FILE"},
+    {"mesh", 0, 0, G_OPTION_ARG_FILENAME, &mesh, "write the view's mesh (PLY)", "FILE"},
+    {"far", 0, 0, G_OPTION_ARG_DOUBLE, &far_m, "meshes end there (1000)", "METRES"},
+    {"work", 0, 0, G_OPTION_ARG_FILENAME, &work, "a capture's work directory (CAPTURE.work)", "FOLDER"},
     {0},
 };
 
 static int run_export(int argc, char **argv, struct lumi_error *error)
 {
     (void)argc;
-    if (!transforms && !colmap)
-        return lumi_fail(error, LUMI_ERR_ARG, "what? --transforms FILE or --colmap FOLDER is needed");
+    if (!transforms && !colmap && !depth && !mesh)
+        return lumi_fail(error, LUMI_ERR_ARG, "what? --transforms, --colmap, --depth or --mesh is needed");
+    if ((depth || mesh) && !view)
+        return lumi_fail(error, LUMI_ERR_ARG, "of which view? --view NAME or NUMBER is needed");
+    if (!(far_m > 0))
+        return lumi_fail(error, LUMI_ERR_ARG, "--far wants a positive number");
     if (transforms)
         LUMI_TRY(lumi_export_transforms(argv[0], transforms, original_names, error));
     if (colmap)
         LUMI_TRY(lumi_export_colmap(argv[0], colmap, text, original_names, error));
-    return LUMI_OK;
+    if (!depth && !mesh)
+        return LUMI_OK;
+    struct lumi_export_view export = {
+        .source = argv[0], .work = work, .view = view, .depth = depth, .mesh = mesh, .far_m = far_m};
+    return lumi_export_view(&export, error);
 }
 
 const struct cli_command cli_export = {
     .name = "export",
-    .arguments = "CAPTURE",
-    .summary = "write cameras and poses for other programs",
-    .description = "From a capture: nerfstudio's transforms.json, a COLMAP model. Numbers are written so that reading "
-                   "them gives the same ones.",
+    .arguments = "CAPTURE|FILE.lumi",
+    .summary = "write cameras, poses, depth or meshes for other programs",
+    .description =
+        "From a capture: nerfstudio's transforms.json (--transforms), a COLMAP model (--colmap); numbers are written "
+        "so "
+        "that reading them gives the same ones. From a .lumi file, or a capture that has been processed: depth "
+        "(--depth, metres along the optical axis) and mesh (--mesh, world coordinates, with texture coordinates and "
+        "colours) of one view.",
     .options = options,
     .min_arguments = 1,
     .max_arguments = 1,

@@ -1,7 +1,7 @@
 /* From a source to a capture: which frames, are they what the source says, and storing them. */
 #include "pipeline/exchange/exchange.h"
 
-#include "pipeline/exchange/sources.h"
+#include "pipeline/exchange/import_source.h"
 #include "proto/base/parallel.h"
 #include "proto/capture/capture.h"
 #include "proto/image/image.h"

@@ -1,2 +1,3 @@
 lumi_test(test_exchange FOLDERS exchange capture image base)
 lumi_test(test_import FOLDERS exchange capture image base)
+lumi_test(test_view_export FOLDERS exchange lightfield image base)

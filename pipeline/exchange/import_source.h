@@ -1,6 +1,6 @@
 /* Within exchange: reading each kind of source from the disk, with its files looked up. */
-#ifndef LUMI_PIPELINE_EXCHANGE_SOURCES_H
-#define LUMI_PIPELINE_EXCHANGE_SOURCES_H
+#ifndef LUMI_PIPELINE_EXCHANGE_IMPORT_SOURCE_H
+#define LUMI_PIPELINE_EXCHANGE_IMPORT_SOURCE_H
 
 #include "pipeline/exchange/exchange.h"
 

@@ -1,5 +1,5 @@
 /* What lies on the disk: which kind of source it is, and where its pictures are. */
-#include "pipeline/exchange/sources.h"
+#include "pipeline/exchange/import_source.h"
 
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
