@@ -1,9 +1,12 @@
 /* lumi sim truth: views of a simulated place with poses and depth, to judge by. */
 #include "cli/command.h"
+#include "pipeline/exchange/exchange.h"
+#include "proto/base/file.h"
+#include "proto/base/memory.h"
 #include "sim/place.h"
 #include "sim/truth.h"
 
-static char *out, *rig_text, *size_text, *format_text, *lens_text;
+static char *out, *rig_text, *from, *poses, *size_text, *format_text, *lens_text;
 static int random_count, seed = 1, threads;
 static double fov, scale = 1, volume, eye_distance;
 static gboolean no_depth, inward;
@@ -15,6 +18,9 @@ static const GOptionEntry options[] = {
      "the "
      "volume they are in",
      "RIG"},
+    {"from", 0, 0, G_OPTION_ARG_FILENAME, &from, "a capture of lumi sim shoot, in place of --rig", "CAPTURE"},
+    {"poses", 0, 0, G_OPTION_ARG_FILENAME, &poses,
+     "the cameras and poses of a transforms.json, whose images need not exist", "FILE"},
     {"random", 0, 0, G_OPTION_ARG_INT, &random_count, "so many views from places inside the rig's volume", "N"},
     {"seed", 0, 0, G_OPTION_ARG_INT, &seed, "of the random views (1)", "S"},
     {"volume", 0, 0, G_OPTION_ARG_DOUBLE, &volume, "radius in metres within which random eyes are (0.6 of the rig's)",
@@ -37,6 +43,29 @@ static void progress(void *context, int done, int total)
     cli_progress(context, done, total);
 }
 
+static int read_poses(struct sim_rig *views, struct lumi_error *error)
+{
+    struct lumi_exchange list;
+    uint8_t *text;
+    size_t size;
+
+    LUMI_TRY(lumi_file_read(poses, (size_t)1 << 28, &text, &size, error));
+    lumi_exchange_init(&list);
+    int code = lumi_exchange_parse_transforms((const char *)text, size, poses, &list, error);
+    for (int i = 0; code == LUMI_OK && i < (int)list.images->len; i++) {
+        const struct lumi_exchange_image *image = lumi_exchange_image(&list, i);
+        struct lumi_lens lens;
+        code = lumi_exchange_lens(lumi_exchange_camera(&list, image->camera), poses, &lens, error);
+        if (code == LUMI_OK)
+            code = sim_rig_add(views, &lens, &image->pose, error);
+    }
+    lumi_exchange_finish(&list);
+    lumi_free(text);
+    if (code == LUMI_OK && views->count == 0)
+        code = lumi_fail(error, LUMI_ERR_FORMAT, "%s: no frames", poses);
+    return code;
+}
+
 static int choose_views(struct sim_rig *views, struct lumi_error *error)
 {
     static const char *const lenses[] = {"default", "pinhole", "brown", "fisheye", NULL};
@@ -51,6 +80,10 @@ static int choose_views(struct sim_rig *views, struct lumi_error *error)
     rig_options.scale = scale;
     rig_options.lens = (enum sim_lens_kind)lens;
     rig_options.inward = inward;
+    if (poses)
+        return read_poses(views, error);
+    if (!random_count && from)
+        return sim_rig_from_capture(views, from, error);
     if (!random_count) {
         rig_options.width = size[0];
         rig_options.height = size[1];
@@ -58,7 +91,10 @@ static int choose_views(struct sim_rig *views, struct lumi_error *error)
         return sim_rig_init(views, rig_text, &rig_options, error);
     }
     struct sim_rig around;
-    LUMI_TRY(sim_rig_init(&around, rig_text, &rig_options, error));
+    if (from)
+        LUMI_TRY(sim_rig_from_capture(&around, from, error));
+    else
+        LUMI_TRY(sim_rig_init(&around, rig_text, &rig_options, error));
     struct sim_random_options random = {.count = random_count,
                                         .width = size[0] ? size[0] : 640,
                                         .height = size[1] ? size[1] : 480,
@@ -110,7 +146,8 @@ const struct cli_command cli_sim_truth = {
     .summary = "views of a simulated place with true poses and depth",
     .description =
         "Writes DIR/transforms.json (nerfstudio's convention), DIR/images and DIR/depth (OpenEXR, channel Z, "
-        "metres along the optical axis): every view of a rig, or --random N views from inside its volume.",
+        "metres along the optical axis): every view of a rig or capture, given poses, or "
+        "--random N views from inside the rig's volume.",
     .options = options,
     .min_arguments = 1,
     .max_arguments = 1,

@@ -50,6 +50,11 @@ struct sim_rig {
 int sim_rig_init(struct sim_rig *rig, const char *text, const struct sim_rig_options *options,
                  struct lumi_error *error);
 void sim_rig_finish(struct sim_rig *rig);
+/* Appends a view at a pose of the caller's; `rig` may be all zero to begin with. */
+int sim_rig_add(struct sim_rig *rig, const struct lumi_lens *lens, const struct lumi_pose *pose,
+                struct lumi_error *error);
+/* The frames of a capture that a simulation made: their lenses, poses, rows and columns. */
+int sim_rig_from_capture(struct sim_rig *rig, const char *path, struct lumi_error *error);
 
 /* `count` views that a light field from this rig should be able to show: eyes within `volume` metres of the centre (0:
  * 0.6 of the radius), or inside the grid; directions up to 45° above and below the horizon, or 8° off straight ahead.

@@ -94,8 +94,33 @@ static void a_capture_holds_every_frame_with_its_true_pose(void **state)
         }
         lumi_free(frames);
         lumi_capture_close(capture);
+        /* The capture as a rig: the same views, and what they lie on. */
+        struct sim_rig again;
+        assert_int_equal(sim_rig_from_capture(&again, path, &error), LUMI_OK);
+        assert_int_equal(again.count, rig.count);
+        assert_int_equal(again.plane, rig.plane);
+        assert_true(fabs(again.radius - rig.radius) < 1e-9);
+        assert_int_equal(again.views[1].column, rig.views[1].column);
+        sim_rig_finish(&again);
         sim_rig_finish(&rig);
     }
+}
+
+static void views_can_be_given_one_by_one(void **state)
+{
+    struct sim_rig from, rig = {0};
+    struct lumi_lens wrong = {0};
+
+    (void)state;
+    make_rig(&from, "planar:2x3:0.05");
+    for (int i = 0; i < from.count; i++)
+        assert_int_equal(sim_rig_add(&rig, &from.views[i].lens, &from.views[i].pose, NULL), LUMI_OK);
+    assert_int_equal(sim_rig_add(&rig, &wrong, &from.views[0].pose, NULL), LUMI_ERR_FORMAT);
+    assert_int_equal(rig.count, 6);
+    assert_memory_equal(&rig.views[4].pose, &from.views[4].pose, sizeof rig.views[4].pose);
+    sim_rig_finish(&rig);
+    sim_rig_finish(&from);
+    assert_int_equal(sim_rig_from_capture(&rig, "/there/is/none", NULL), LUMI_ERR_NOTFOUND);
 }
 
 static void truth_writes_the_bytes_again_for_any_number_of_threads(void **state)
@@ -142,6 +167,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_capture_holds_every_frame_with_its_true_pose),
+        cmocka_unit_test(views_can_be_given_one_by_one),
         cmocka_unit_test(truth_writes_the_bytes_again_for_any_number_of_threads),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
