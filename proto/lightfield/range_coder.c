@@ -19,10 +19,10 @@ static inline uint32_t zero_share(const struct lumi_bit_model *model, uint32_t r
 static inline void adapt(struct lumi_bit_model *model, int bit)
 {
     if (bit) {
-        model->fast = (uint16_t)(model->fast - (model->fast >> 4));
+        model->fast = (uint16_t)(model->fast - (model->fast >> 5));
         model->slow = (uint16_t)(model->slow - (model->slow >> 7));
     } else {
-        model->fast = (uint16_t)(model->fast + ((65535 - model->fast) >> 4));
+        model->fast = (uint16_t)(model->fast + ((65535 - model->fast) >> 5));
         model->slow = (uint16_t)(model->slow + ((65535 - model->slow) >> 7));
     }
 }

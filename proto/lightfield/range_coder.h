@@ -1,7 +1,7 @@
 /* Adaptive binary range coding, for the side information of tiles.
  *
  * Arithmetic: 32-bit range, carries propagated as in Martin, "Range encoding" (1979), byte-wise as in LZMA's coder. A
- * probability is the mean of two 16-bit estimates that adapt with rates 1/16 and 1/128. docs/lumi-format.md, "Range
+ * probability is the mean of two 16-bit estimates that adapt with rates 1/32 and 1/128. docs/lumi-format.md, "Range
  * coder", has every step. */
 #ifndef LUMI_PROTO_LIGHTFIELD_RANGE_CODER_H
 #define LUMI_PROTO_LIGHTFIELD_RANGE_CODER_H
