@@ -50,6 +50,7 @@ int surface_init(struct surface *s, const struct lumi_grid *grid, int triangle_l
             s->tile_triangles[tile] = 2;
         }
     s->triangle_count = s->alive = 2 * cols * rows;
+    s->clock = 0;
     return LUMI_OK;
 }
 
@@ -58,6 +59,9 @@ void surface_finish(struct surface *s)
     lumi_free(s->vertices);
     lumi_free(s->triangles);
     lumi_free(s->tile_triangles);
+    s->vertices = NULL;
+    s->triangles = NULL;
+    s->tile_triangles = NULL;
 }
 
 static int corner_of(const struct surface_triangle *t, int vertex)

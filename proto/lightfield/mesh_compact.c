@@ -286,11 +286,14 @@ static void code_depths(struct walk *walk, int tile, struct lumi_mesh_vertex *v,
             const int group = k < 4 ? 0 : k < count - walk->counts[tile].inside ? 1 : 2;
             const bool steep = t->shift > 5;
             const int read = code_number(walk, &walk->depth[2 * group + steep], (int)lumi_zigzag(difference));
-            const int value = guess + (int)lumi_unzigzag((uint64_t)read);
-            walk->code[k] = (value < 0 ? value + codes : value >= codes ? value - codes : value) << shift;
-            walk->known[k] = true;
-            if (walk->code[k] < 0 || walk->code[k] > 65535)
+            const int sum = guess + (int)lumi_unzigzag((uint64_t)read);
+            const int value = sum < 0 ? sum + codes : sum >= codes ? sum - codes : sum;
+            if (value < 0 || value >= codes) {
                 walk->failed = true;
+                return;
+            }
+            walk->code[k] = value << shift;
+            walk->known[k] = true;
         }
         least = walk->code[k] < least ? walk->code[k] : least;
         most = walk->code[k] > most ? walk->code[k] : most;

@@ -222,7 +222,7 @@ static void more_triangles_mean_less_error(void **state)
         lumi_view_mesh_finish(&mesh);
         lumi_raster_finish(&depth);
     }
-    assert_true(last < 1.2);
+    assert_true(last < 0.9);
 }
 
 static void the_same_depth_gives_the_same_bytes(void **state)
