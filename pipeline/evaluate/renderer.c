@@ -91,20 +91,18 @@ int lumi_renderer_damaged(struct lumi_renderer *renderer)
 
 void lumi_renderer_range(const struct lumi_renderer *renderer, double *low, double *high)
 {
-    const struct lumi_view *first = lumi_viewset_view(renderer->set, 0);
-
-    *low = first->mesh->w_min;
+    *low = INFINITY;
     *high = 0;
     for (int i = 0; i < lumi_viewset_count(renderer->set); i++) {
         const struct lumi_view_mesh *mesh = lumi_viewset_view(renderer->set, i)->mesh;
-        for (int t = 0; t < mesh->cols * mesh->rows; t++)
+        for (int t = 0; mesh && t < mesh->cols * mesh->rows; t++)
             for (int v = 0; v < mesh->tiles[t].vertex_count; v++) {
                 double w = lumi_mesh_inverse_depth(mesh, &mesh->tiles[t], mesh->tiles[t].vertices[v].d);
                 *low = fmin(*low, w);
                 *high = fmax(*high, w);
             }
     }
-    *low = fmax(*low, 0);
+    *low = fmin(fmax(*low, 0), *high);
 }
 
 void lumi_renderer_set_plane(struct lumi_renderer *renderer, double inverse_distance)

@@ -84,7 +84,7 @@ static void arrange(const struct lumi_field *field, struct arrangement *a)
         a->gaze = lumi_add(a->gaze, forward);
         a->down = lumi_add(a->down, lumi_axis(&view->pose, 1));
         a->outwards += lumi_dot(forward, lumi_sub(view->pose.t, info->centre));
-        a->nearness += mesh->w_min + 0.5 * 65535 * mesh->w_step;
+        a->nearness += mesh ? (double)mesh->w_min + 0.5 * 65535 * (double)mesh->w_step : 0;
     }
     a->nearness /= count > 0 ? count : 1;
 }

@@ -169,7 +169,7 @@ static int draw_group(struct render *render, const int *group, int count, struct
             lumi_fail(error, code, "no memory while drawing");
     }
     for (int i = 0; i < count; i++)
-        if (render->surfaces[i].patches) {
+        if (render->surfaces[i].tile_x) { /* made, and its view held */
             lumi_surface_finish(&render->surfaces[i]);
             lumi_viewset_release(render->set, group[i]);
         }

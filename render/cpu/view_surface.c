@@ -201,8 +201,10 @@ int lumi_surface_build(struct lumi_surface_view *surface)
     surface->tile_x = lumi_alloc((size_t)grid->cols * 2, sizeof(float));
     surface->tile_y = lumi_alloc((size_t)grid->rows * 2, sizeof(float));
     int code = surface->tile_x && surface->tile_y ? LUMI_OK : LUMI_ERR_NOMEM;
-    if (code == LUMI_OK)
-        code = surface->view->mesh ? build_mesh(surface) : build_dense(surface);
+    if (code == LUMI_OK && surface->view->mesh)
+        code = build_mesh(surface);
+    else if (code == LUMI_OK && surface->view->inverse_depth)
+        code = build_dense(surface);
     if (code != LUMI_OK) {
         lumi_surface_finish(surface);
         return code;
