@@ -1,0 +1,39 @@
+/* The options `lumi process` and `lumi stage` share: the parameters of the pipeline. */
+#ifndef LUMI_CLI_PROCESS_OPTIONS_H
+#define LUMI_CLI_PROCESS_OPTIONS_H
+
+#include "cli/command.h"
+#include "pipeline/run/run.h"
+
+/* Values that the option tables of both commands write to. */
+struct process_options {
+    char *work, *projection, *fov, *shape, *kernel;
+    double pixels_per_degree, near_m, far_m, gp, disk_scale;
+    int neighbours, quality, cluster, threads;
+    gint64 target_bytes;
+};
+extern struct process_options process_options;
+
+/* clang-format off */
+#define PROCESS_OPTIONS                                                                                                \
+    {"work", 'w', 0, G_OPTION_ARG_FILENAME, &process_options.work, "where the stages keep their files (CAPTURE.work)", "DIR"}, \
+    {"threads", 'j', 0, G_OPTION_ARG_INT, &process_options.threads, "threads (all)", "N"},                              \
+    {"projection", 0, 0, G_OPTION_ARG_STRING, &process_options.projection, "auto, equiangular or rectilinear views (auto)", "NAME"}, \
+    {"fov", 0, 0, G_OPTION_ARG_STRING, &process_options.fov, "field of view of the views, degrees (from the lens)", "XxY"}, \
+    {"pixels-per-degree", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.pixels_per_degree, "density of the views (from the lens)", "N"}, \
+    {"near", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.near_m, "nearest surface (found)", "METRES"},                  \
+    {"far", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.far_m, "farthest surface (found)", "METRES"},                   \
+    {"neighbours", 0, 0, G_OPTION_ARG_INT, &process_options.neighbours, "views each is matched against (8)", "N"},      \
+    {"gp", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.gp, "geometry precision: 2 GP triangles a tile on average (5)", "GP"}, \
+    {"disk-shape", 0, 0, G_OPTION_ARG_STRING, &process_options.shape, "oval or rectangle (oval)", "NAME"},              \
+    {"disk-scale", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.disk_scale, "widens the blending disks (1)", "FACTOR"},  \
+    {"kernel", 0, 0, G_OPTION_ARG_STRING, &process_options.kernel, "linear, gaussian or cubic (linear)", "NAME"},       \
+    {"quality", 'q', 0, G_OPTION_ARG_INT, &process_options.quality, "of the images, 0 to 100 (70)", "N"},               \
+    {"target-bytes", 0, 0, G_OPTION_ARG_INT64, &process_options.target_bytes, "finds the quality for a file of this size", "N"}, \
+    {"cluster", 0, 0, G_OPTION_ARG_INT, &process_options.cluster, "images a reference image (25)", "N"}
+/* clang-format on */
+
+/* Checks them and fills the parameters. */
+int process_options_read(struct lumi_parameters *parameters, struct lumi_error *error);
+
+#endif

@@ -1,0 +1,75 @@
+/* From the work directory to where the user wants it. */
+#include "pipeline/graph/deliver.h"
+
+#include "proto/base/memory.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <glib.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { BLOCK = 1 << 20 };
+
+static int write_all(int file, const char *data, size_t size, const char *name, struct lumi_error *error)
+{
+    while (size > 0) {
+        ssize_t written = write(file, data, size);
+        if (written < 0 && errno == EINTR)
+            continue;
+        if (written < 0)
+            return lumi_fail_errno(error, name, "write");
+        data += written;
+        size -= (size_t)written;
+    }
+    return LUMI_OK;
+}
+
+static int copy(int in, int out, const char *from, const char *to, struct lumi_error *error)
+{
+    char *block = lumi_alloc(BLOCK, 1);
+    int code = LUMI_OK;
+
+    if (!block)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", to);
+    for (;;) {
+        ssize_t count = read(in, block, BLOCK);
+        if (count < 0 && errno == EINTR)
+            continue;
+        if (count < 0)
+            code = lumi_fail_errno(error, from, "read");
+        if (count <= 0)
+            break;
+        LUMI_GOTO(code, out, write_all(out, block, (size_t)count, to, error));
+    }
+    if (code == LUMI_OK && fsync(out))
+        code = lumi_fail_errno(error, to, "sync");
+out:
+    lumi_free(block);
+    return code;
+}
+
+int lumi_deliver(const char *from, const char *to, struct lumi_error *error)
+{
+    g_autofree char *temporary = g_strdup_printf("%s.tmp-%ld", to, (long)getpid());
+    int in = open(from, O_RDONLY | O_CLOEXEC), out = -1, code;
+
+    if (in < 0)
+        return lumi_fail_errno(error, from, "open");
+    out = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (out < 0) {
+        code = lumi_fail_errno(error, to, "create");
+        close(in);
+        return code;
+    }
+    code = copy(in, out, from, to, error);
+    close(in);
+    if (close(out) && code == LUMI_OK)
+        code = lumi_fail_errno(error, to, "close");
+    if (code == LUMI_OK && rename(temporary, to))
+        code = lumi_fail_errno(error, to, "rename");
+    if (code != LUMI_OK)
+        unlink(temporary);
+    return code;
+}

@@ -1,0 +1,23 @@
+/* The stages as a graph, and the run over all of them: from a capture to a field. */
+#ifndef LUMI_PIPELINE_GRAPH_GRAPH_H
+#define LUMI_PIPELINE_GRAPH_GRAPH_H
+
+#include "pipeline/run/run.h"
+
+/* The stages there are, in an order that can be run. NULL-terminated. */
+extern const struct lumi_stage *const lumi_stages[];
+
+const struct lumi_stage *lumi_stage_by_name(const char *name);
+
+/* Opens a run and chooses what all stages share: the views' grid and the surface the centres lie on. Arguments as
+ * lumi_run_open. */
+int lumi_graph_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
+                    bool alone, struct lumi_run **run, struct lumi_error *error);
+
+/* Called before and (with done true) after every stage; skipped: outputs that were there already. May be NULL. */
+typedef void (*lumi_graph_report)(const struct lumi_stage *stage, bool done, int outputs, int skipped);
+
+/* Runs every stage and leaves the field at `output` (written under a temporary name and renamed). */
+int lumi_graph_process(struct lumi_run *run, const char *output, lumi_graph_report report, struct lumi_error *error);
+
+#endif
