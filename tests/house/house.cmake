@@ -25,7 +25,6 @@ if(LUMI_CXX)
   set_tests_properties(house_headers PROPERTIES LABELS house TIMEOUT 300)
 endif()
 
-if(EXISTS ${PROJECT_SOURCE_DIR}/cli/cmd_process.c)
 # A small field, for the tests that want one: shot and processed by the program itself.
 set(field ${CMAKE_CURRENT_BINARY_DIR}/field)
 lumi_house(field ${here}/field.sh $<TARGET_FILE:lumi> ${field})
@@ -38,7 +37,6 @@ lumi_house(install ${here}/install.sh ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR
 # lumi info against what the file system says.
 lumi_house(info ${here}/info.sh $<TARGET_FILE:lumi> ${field})
 set_tests_properties(house_install house_info PROPERTIES FIXTURES_REQUIRED house_field)
-endif()
 
 # Manual and completion against `lumi help`.
 set(manual_work ${CMAKE_CURRENT_BINARY_DIR}/manual)
