@@ -3,6 +3,9 @@
 
 #include "proto/base/memory.h"
 #include "proto/lightfield/grid.h"
+#include "proto/lightfield/mesh_compact.h"
+
+#include <string.h>
 
 int lumi_view_mesh_create(struct lumi_view_mesh *mesh, int cols, int rows, const int *vertex_counts,
                           const int *triangle_counts)
@@ -45,4 +48,43 @@ void lumi_view_mesh_finish(struct lumi_view_mesh *mesh)
     lumi_free(mesh->tiles);
     lumi_free(mesh->block);
     *mesh = (struct lumi_view_mesh){0};
+}
+
+int lumi_view_mesh_copy(const struct lumi_view_mesh *mesh, struct lumi_view_mesh *copy)
+{
+    const int tiles = mesh->cols * mesh->rows;
+    int *counts = lumi_alloc(2 * (size_t)tiles, sizeof *counts);
+
+    *copy = (struct lumi_view_mesh){0};
+    if (!counts)
+        return LUMI_ERR_NOMEM;
+    for (int i = 0; i < tiles; i++) {
+        counts[i] = mesh->tiles[i].vertex_count;
+        counts[tiles + i] = mesh->tiles[i].triangle_count;
+    }
+    const int result = lumi_view_mesh_create(copy, mesh->cols, mesh->rows, counts, counts + tiles);
+    lumi_free(counts);
+    if (result != LUMI_OK)
+        return result;
+    copy->w_min = mesh->w_min;
+    copy->w_step = mesh->w_step;
+    for (int i = 0; i < tiles; i++) {
+        const struct lumi_tile_mesh *t = &mesh->tiles[i];
+        copy->tiles[i].base = t->base;
+        copy->tiles[i].shift = t->shift;
+        memcpy(lumi_mesh_vertices(copy, i), t->vertices, t->vertex_count * sizeof *t->vertices);
+        memcpy(lumi_mesh_indices(copy, i), t->indices, 3u * t->triangle_count * sizeof *t->indices);
+    }
+    return LUMI_OK;
+}
+
+int lumi_mesh_extent(const struct lumi_tile_mesh *tile, bool vertical)
+{
+    int most = 0;
+
+    for (int k = 0; k < tile->vertex_count; k++) {
+        const int at = vertical ? tile->vertices[k].t : tile->vertices[k].s;
+        most = at > most ? at : most;
+    }
+    return most;
 }

@@ -484,26 +484,14 @@ static bool count_groups(const struct walk *walk, int tile, struct counts *c)
     return counts[0] == 4 && t->triangle_count == triangle_total(c);
 }
 
-/* The largest s (t) of the last tile: where the view ends. */
-static int extent_of(const struct lumi_tile_mesh *tile, bool vertical)
-{
-    int most = 0;
-
-    for (int k = 0; k < tile->vertex_count; k++) {
-        const int at = vertical ? tile->vertices[k].t : tile->vertices[k].s;
-        most = at > most ? at : most;
-    }
-    return most;
-}
-
 static bool encode(struct walk *walk, int *shifts, struct lumi_writer *writer)
 {
     const int tiles = walk->cols * walk->rows;
     struct lumi_writer coded;
     long vertices;
 
-    walk->right = extent_of(&walk->mesh->tiles[tiles - 1], false);
-    walk->bottom = extent_of(&walk->mesh->tiles[tiles - 1], true);
+    walk->right = lumi_mesh_extent(&walk->mesh->tiles[tiles - 1], false);
+    walk->bottom = lumi_mesh_extent(&walk->mesh->tiles[tiles - 1], true);
     if (walk->right == 0 || walk->bottom == 0)
         return false;
     for (int i = 0; i < tiles; i++) {
@@ -529,37 +517,16 @@ static bool encode(struct walk *walk, int *shifts, struct lumi_writer *writer)
     return good;
 }
 
-/* A copy for the walk, which writes what it walks over. */
-static bool copy_mesh(const struct lumi_view_mesh *from, int *counts, struct lumi_view_mesh *to)
-{
-    const int tiles = from->cols * from->rows;
-
-    for (int i = 0; i < tiles; i++) {
-        counts[i] = from->tiles[i].vertex_count;
-        counts[tiles + i] = from->tiles[i].triangle_count;
-    }
-    if (lumi_view_mesh_create(to, from->cols, from->rows, counts, counts + tiles) != LUMI_OK)
-        return false;
-    for (int i = 0; i < tiles; i++) {
-        const struct lumi_tile_mesh *t = &from->tiles[i];
-        to->tiles[i].base = t->base;
-        to->tiles[i].shift = t->shift;
-        memcpy(lumi_mesh_vertices(to, i), t->vertices, t->vertex_count * sizeof *t->vertices);
-        memcpy(lumi_mesh_indices(to, i), t->indices, 3u * t->triangle_count * sizeof *t->indices);
-    }
-    return true;
-}
-
 bool lumi_mesh_compact_encode(const struct lumi_view_mesh *mesh, struct lumi_writer *writer)
 {
     const size_t tiles = (size_t)mesh->cols * (size_t)mesh->rows;
     struct walk *walk = lumi_calloc(1, sizeof *walk);
     struct counts *counts = lumi_calloc(tiles, sizeof *counts);
-    int *numbers = lumi_calloc(2 * tiles, sizeof *numbers);
+    int *numbers = lumi_calloc(tiles, sizeof *numbers);
     struct lumi_view_mesh copy = {0};
     bool good = false;
 
-    if (walk && counts && numbers && copy_mesh(mesh, numbers, &copy)) {
+    if (walk && counts && numbers && lumi_view_mesh_copy(mesh, &copy) == LUMI_OK) {
         init(walk, mesh->cols, mesh->rows);
         walk->writing = true;
         walk->counts = counts;

@@ -13,4 +13,8 @@ bool lumi_mesh_compact_encode(const struct lumi_view_mesh *mesh, struct lumi_wri
 int lumi_mesh_compact_decode(struct lumi_reader *reader, int cols, int rows, struct lumi_view_mesh *mesh,
                              struct lumi_error *error);
 
+/* mesh.c: a copy, with memory of its own; the largest s (or t) of a tile's vertices. */
+int lumi_view_mesh_copy(const struct lumi_view_mesh *mesh, struct lumi_view_mesh *copy);
+int lumi_mesh_extent(const struct lumi_tile_mesh *tile, bool vertical);
+
 #endif
