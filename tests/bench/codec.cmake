@@ -1,0 +1,5 @@
+pkg_check_modules(libwebp IMPORTED_TARGET libwebp)
+if(TARGET PkgConfig::libwebp)
+  add_executable(bench_codec bench_codec.c)
+  target_link_libraries(bench_codec PRIVATE lumi_flags lumi_compress lumi_image lumi_lightfield PkgConfig::libwebp)
+endif()
