@@ -19,7 +19,7 @@ void compress_quality_init(struct compress_quality *quality, int value)
 
     quantizer = quantizer < 0 ? 0 : quantizer > 63 ? 63 : quantizer;
     *quality = (struct compress_quality){
-        .tile_quantizer = quantizer, .reference_quantizer = quantizer / 3, .speed = 2, .range = 24};
+        .tile_quantizer = quantizer, .reference_quantizer = quantizer / 3, .speed = 2, .range = 16};
 }
 
 int compress_level_init(struct compress_level *level, struct lumi_run *run, int index, int quality,
