@@ -3,10 +3,10 @@
 # replaced by a planar array and by an outward sphere; views between them are the truth. Prints the figures of `lumi eval`
 # for the disks and for the best single plane.
 #
-# usage: povray.sh LUMI [DIR]   (DIR: where pictures and fields are kept; a temporary folder that is removed otherwise)
+# usage: povray.sh BUILD [DIR]   (DIR: where pictures and fields are kept; a temporary folder that is removed otherwise)
 # Exits with 77 where POV-Ray or its examples are missing.
 set -eu
-lumi=$(realpath "$1")
+lumi=$(realpath "$1/cli/lumi")
 dir=${2:-}
 if [ -z "$dir" ]; then
     dir=$(mktemp -d)
