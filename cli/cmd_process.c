@@ -5,6 +5,7 @@
 
 #include <json-glib/json-glib.h>
 #include <stdio.h>
+#include <sys/resource.h>
 #include <time.h>
 
 static char *output;
@@ -27,6 +28,15 @@ static double seconds(clockid_t clock)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+/* The most memory that this process has held so far, bytes. */
+static double peak_memory(void)
+{
+    struct rusage usage = {0};
+
+    getrusage(RUSAGE_SELF, &usage);
+    return 1024.0 * (double)usage.ru_maxrss;
+}
+
 static void report(const struct lumi_stage *stage, bool done, int outputs, int skipped)
 {
     if (!done) {
@@ -37,7 +47,8 @@ static void report(const struct lumi_stage *stage, bool done, int outputs, int s
     double wall = seconds(CLOCK_MONOTONIC) - stage_wall, cpu = seconds(CLOCK_PROCESS_CPUTIME_ID) - stage_cpu;
     cli_progress_end();
     if (!builder) {
-        printf("%-18s %5d made %5d there %8.1f s %8.1f core-s\n", stage->name, outputs - skipped, skipped, wall, cpu);
+        printf("%-18s %5d made %5d there %8.1f s %8.1f core-s %6.0f MB at most so far\n", stage->name,
+               outputs - skipped, skipped, wall, cpu, peak_memory() / 1e6);
         fflush(stdout);
         return;
     }
@@ -52,6 +63,8 @@ static void report(const struct lumi_stage *stage, bool done, int outputs, int s
     json_builder_add_double_value(builder, wall);
     json_builder_set_member_name(builder, "core_s");
     json_builder_add_double_value(builder, cpu);
+    json_builder_set_member_name(builder, "peak_bytes");
+    json_builder_add_int_value(builder, (gint64)peak_memory());
     json_builder_end_object(builder);
 }
 

@@ -3,19 +3,15 @@
 # replaced by a planar array and by an outward sphere; views between them are the truth. Prints the figures of `lumi eval`
 # for the disks and for the best single plane.
 #
-# usage: povray.sh BUILD [DIR]   (DIR: where pictures and fields are kept; a temporary folder that is removed otherwise)
-# Exits with 77 where POV-Ray or its examples are missing.
+# usage: povray.sh BUILD [DIR]   (DIR: kept, its photographs used again; a temporary folder that is removed otherwise)
+# About 8 core-minutes, most of them POV-Ray's. Exits with 77 where POV-Ray or its examples are missing.
 set -eu
+. "$(dirname "$0")/functions"
 lumi=$(realpath "$1/cli/lumi")
-dir=${2:-}
-if [ -z "$dir" ]; then
-    dir=$(mktemp -d)
-    trap 'rm -rf "$dir"' EXIT
-fi
-mkdir -p "$dir"
 examples=/usr/share/doc/povray/examples/advanced
-command -v povray >/dev/null || { echo "skipped: povray is not installed"; exit 77; }
-[ -e $examples/biscuit.pov ] || [ -e $examples/biscuit.pov.gz ] || { echo "skipped: povray-examples is not installed"; exit 77; }
+command -v povray >/dev/null || skip "povray is not installed"
+[ -e $examples/biscuit.pov ] || [ -e $examples/biscuit.pov.gz ] || skip "povray-examples is not installed"
+work_folder "${2:-}"
 
 # Poses: awk prints transforms.json (metres, nerfstudio's convention) and view.inc (centimetres; POV-Ray's frame is
 # left-handed with y up: ours with y and z exchanged) from lines "x y z  fx fy fz" of eye and forward, world z up.
@@ -50,6 +46,7 @@ scene() {
 }
 
 shoot() { # FOLDER WIDTH HEIGHT
+    [ ! -e "$1/0000.png" ] || return 0
     n=$(cat "$1/count")
     scene > "$1/scene.pov"
     (cd "$1" && povray +Iscene.pov +Oframe.png "+W$2" "+H$3" -D +A0.1 +AM2 +R3 -J +KFI0 "+KFF$((n - 1))" +KI0 +KF1 \
@@ -61,21 +58,15 @@ shoot() { # FOLDER WIDTH HEIGHT
     done
 }
 
-judge() { # NAME
+field() { # NAME
     "$lumi" import "$dir/$1-input/transforms.json" -o "$dir/$1.capture"
     "$lumi" process "$dir/$1.capture" -o "$dir/$1.lumi" -q 90
-    echo "== biscuit, $1: disks"
-    "$lumi" eval "$dir/$1.lumi" --truth "$dir/$1-truth/transforms.json"
-    if [ "$1" = planar ]; then
-        echo "== biscuit, $1: best single plane (CMBF+P)"
-        "$lumi" eval "$dir/$1.lumi" --truth "$dir/$1-truth/transforms.json" --method plane
-    fi
 }
 
 for part in planar-input planar-truth outward-input outward-truth; do mkdir -p "$dir/$part"; done
 rm -rf "$dir"/*.capture "$dir"/*.work
 
-# Planar: 7×7, 1.5 cm apart, where the scene's own camera stands, looking where it looks. Truth between the grid's places.
+# Planar: 5×5, 1.5 cm apart, where the scene's own camera stands, looking where it looks. Truth between the grid's places.
 plane='BEGIN {
     e[1] = .20; e[2] = .28; e[3] = .40; z[1] = -.20; z[2] = -.28; z[3] = -.38
     l = sqrt(z[1]^2+z[2]^2+z[3]^2); for (i = 1; i <= 3; i++) z[i] /= l
@@ -84,23 +75,29 @@ plane='BEGIN {
     for (r = -a; r <= a; r += s) for (c = -a; c <= a; c += s) {
         for (i = 1; i <= 3; i++) p[i] = e[i] + .015 * (c * x[i] + r * y[i])
         print p[1], p[2], p[3], z[1], z[2], z[3] } }'
-awk -v a=3 -v s=1 "$plane" | write_poses "$dir/planar-input" 512 384 50
-awk -v a=2.5 -v s=2 "$plane" | write_poses "$dir/planar-truth" 512 384 50
+awk -v a=2 -v s=1 "$plane" | write_poses "$dir/planar-input" 384 288 50
+awk -v a=1.5 -v s=2 "$plane" | write_poses "$dir/planar-truth" 384 288 50
 
 # Outward: a sphere of 5 cm radius between the tin and the cup, 7 rows of 18, looking out; truth from eyes inside it.
 awk 'BEGIN { pi = atan2(0, -1)
     for (r = 0; r < 7; r++) for (c = 0; c < 18; c++) {
         t = (-75 + 25 * r) * pi / 180; q = 2 * pi * c / 18
         x = cos(t) * cos(q); y = cos(t) * sin(q); z = sin(t)
-        print .02 + .05 * x, -.02 + .05 * y, .11 + .05 * z, x, y, z } }' | write_poses "$dir/outward-input" 384 384 95
+        print .02 + .05 * x, -.02 + .05 * y, .11 + .05 * z, x, y, z } }' | write_poses "$dir/outward-input" 256 256 95
 awk 'BEGIN { pi = atan2(0, -1)
     for (c = 0; c < 8; c++) { q = 2 * pi * c / 8 + .2; t = -.25 - .2 * (c % 3)
         print .02 + .02 * cos(2.4 * c), -.02 + .02 * sin(2.4 * c), .11 + .01 * (c % 3 - 1), cos(t) * cos(q), cos(t) * sin(q), sin(t) } }' |
-    write_poses "$dir/outward-truth" 512 384 70
+    write_poses "$dir/outward-truth" 256 192 70
 
-shoot "$dir/planar-input" 512 384
-shoot "$dir/planar-truth" 512 384
-shoot "$dir/outward-input" 384 384
-shoot "$dir/outward-truth" 512 384
-judge planar
-judge outward
+shoot "$dir/planar-input" 384 288
+shoot "$dir/planar-truth" 384 288
+shoot "$dir/outward-input" 256 256
+shoot "$dir/outward-truth" 256 192
+field planar
+field outward
+machine
+judge_heading
+judge "biscuit, planar" "$dir/planar.lumi" "$dir/planar-truth/transforms.json" --sheet "$dir/planar.png"
+judge "biscuit, planar, plane" "$dir/planar.lumi" "$dir/planar-truth/transforms.json" --method plane
+judge "biscuit, outward" "$dir/outward.lumi" "$dir/outward-truth/transforms.json" --sheet "$dir/outward.png"
+judge "biscuit, outward, plane" "$dir/outward.lumi" "$dir/outward-truth/transforms.json" --method plane

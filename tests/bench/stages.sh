@@ -1,0 +1,70 @@
+#!/bin/sh
+# What the pipeline costs: core-seconds a megapixel of every stage and the most memory held, by `lumi process --json`, on
+# captures of several kinds; and how that memory grows with the number of images.
+#
+# The issue's bound, 3 GiB for 1,300 images of 1280 x 1024, is hours to run; it is checked in two parts: what nine large
+# images take, and what each further one adds, by captures of 9, 40, 80 and 160 images of 256 x 192 (up to 40 views stay in
+# memory for their neighbours' depth, so the growth to 40 is counted by itself). The last line puts these together, in
+# proportion to pixels, and says that it is an extrapolation.
+# usage: stages.sh BUILD [DIR] [CAPTURE...]   (DIR: kept, its photographs used again; CAPTURE: also of these)
+set -eu
+. "$(dirname "$0")/functions"
+lumi=$1/cli/lumi
+shift
+work_folder "${1:-}"
+[ $# -eq 0 ] || shift
+machine
+
+# Rows of `lumi process --json`: stage, core-seconds a megapixel (of views), memory held at most so far; sets $peak (MB).
+measure() { # NAME CAPTURE
+    rm -rf "$2.work"
+    "$lumi" process "$2" -o "$dir/stages.lumi" --json >"$dir/$1.json" 2>"$dir/$1.log" || { cat "$dir/$1.log" >&2; exit 1; }
+    rm -rf "$2.work" "$dir/stages.lumi"
+    awk -v name="$1" -F '[:,]' '
+        { gsub(/[" ]/, "") }
+        $1 == "stage" { stage[++n] = $2 }
+        $1 == "core_s" { core[n] = $2 }
+        $1 == "wall_s" { wall[n] = $2 }
+        $1 == "peak_bytes" { peak[n] = $2 }
+        $1 == "images" { images = $2 }
+        $1 == "width" { width = $2 }
+        $1 == "height" { height = $2 }
+        END {
+            mpx = images * width * height / 1e6
+            printf "%s: %d views of %d x %d, %.1f Mpx\n%-18s %12s %10s %16s\n", name, images, width, height, mpx, "stage",
+                   "core-s/Mpx", "wall s", "MB at most"
+            for (i = 1; i <= n; i++) {
+                printf "%-18s %12.2f %10.1f %16.0f\n", stage[i], core[i] / mpx, wall[i], peak[i] / 1e6
+                sum += core[i] / mpx
+            }
+            printf "%-18s %12.2f\n", "all", sum
+        }' "$dir/$1.json"
+    peak=$(sed -n 's/.*"peak_bytes" : \([0-9]*\).*/\1/p' "$dir/$1.json" | tail -n 1)
+}
+
+[ -d "$dir/large.capture" ] ||
+    "$lumi" sim shoot room --rig planar:3x3:0.05 --fov 90 --size 1280x1024 -o "$dir/large.capture"
+measure large "$dir/large.capture"
+large=$peak
+
+[ -d "$dir/many" ] || "$lumi" sim truth room --rig sphere:8x20:0.35 --fov 90 --size 256x192 --no-depth -o "$dir/many"
+points=
+for count in 9 40 80 160; do
+    rm -rf "$dir/many$count.capture"
+    "$lumi" import "$dir/many/transforms.json" --limit $count -o "$dir/many$count.capture"
+    measure many$count "$dir/many$count.capture"
+    points="$points $count:$peak"
+done
+for capture in "$@"; do
+    measure "$(basename "$capture")" "$capture"
+done
+
+echo "memory at most, by the number of images:$points (images:bytes)"
+echo "$points" | awk -v large="$large" '{
+    for (i = 1; i <= 4; i++) { split($i, p, ":"); n[i] = p[1]; at[i] = p[2] }
+    ratio = 1280 * 1024 / (256 * 192)
+    each = (at[4] - at[3]) / (n[4] - n[3])
+    if (each < 0) each = 0
+    printf "from %d to %d images: %.1f kB each, %.2f bytes a pixel\n", n[3], n[4], each / 1e3, each / 256 / 192
+    all = large + (at[3] > at[1] ? at[3] - at[1] : 0) * ratio + (1300 - n[3]) * each * ratio
+    printf "extrapolated, not measured: %.2f GiB for 1,300 images of 1280 x 1024; the bound is 3\n", all / 1073741824 }'
