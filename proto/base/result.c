@@ -6,6 +6,14 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Names and messages that come from files may hold anything; an error is one line all the same. */
+static void keep_one_line(char *text)
+{
+    for (; *text; text++)
+        if ((unsigned char)*text < ' ' || *text == 0x7f)
+            *text = '?';
+}
+
 int lumi_fail(struct lumi_error *error, int code, const char *format, ...)
 {
     if (error) {
@@ -14,6 +22,7 @@ int lumi_fail(struct lumi_error *error, int code, const char *format, ...)
         error->code = code;
         vsnprintf(error->text, sizeof error->text, format, args);
         va_end(args);
+        keep_one_line(error->text);
     }
     return code;
 }
@@ -32,6 +41,7 @@ int lumi_fail_prefix(struct lumi_error *error, const char *format, ...)
     if (used >= 0 && (size_t)used < sizeof text)
         snprintf(text + used, sizeof text - (size_t)used, ": %.*s", (int)(sizeof text - (size_t)used - 3), error->text);
     memcpy(error->text, text, sizeof text);
+    keep_one_line(error->text);
     return error->code;
 }
 

@@ -211,9 +211,21 @@ static void a_parallel_loop_visits_each_item_once_and_reports_a_failure(void **s
         assert_int_equal(marks[i], 1);
 }
 
+static void an_error_is_one_line_whatever_the_name_in_it(void **state)
+{
+    struct lumi_error error;
+
+    (void)state;
+    lumi_fail(&error, LUMI_ERR_FORMAT, "frame '%s' is unknown", "a\nb\x1b[2J\x7f\xc3\xa9");
+    assert_string_equal(error.text, "frame 'a?b?[2J?\xc3\xa9' is unknown");
+    assert_int_equal(lumi_fail_prefix(&error, "%s", "x\ry"), LUMI_ERR_FORMAT);
+    assert_string_equal(error.text, "x?y: frame 'a?b?[2J?\xc3\xa9' is unknown");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_error_is_one_line_whatever_the_name_in_it),
         cmocka_unit_test(crc32c_gives_the_published_check_value),
         cmocka_unit_test(a_reader_past_its_end_gives_zeros_and_stays_failed),
         cmocka_unit_test(varints_survive_the_round_trip_and_overlong_ones_are_refused),
