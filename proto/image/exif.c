@@ -33,10 +33,12 @@ static uint32_t get32(const struct tiff *tiff, size_t at)
     return tiff->big ? first << 16 | second : second << 16 | first;
 }
 
-/* Calls itself once, for the EXIF directory that the first one points to. */
-static void read_directory(const struct tiff *tiff, size_t directory, bool first, struct lumi_image_meta *meta)
+/* Where the first directory says that the EXIF directory lies, 0 if it does not. Of several the last one is followed,
+ * once: a directory that names itself a thousand times costs no more. */
+static uint32_t read_directory(const struct tiff *tiff, size_t directory, bool first, struct lumi_image_meta *meta)
 {
     unsigned count = get16(tiff, directory);
+    uint32_t exif = 0;
 
     for (unsigned i = 0; i < count; i++) {
         size_t entry = directory + 2 + (size_t)i * 12;
@@ -47,12 +49,13 @@ static void read_directory(const struct tiff *tiff, size_t directory, bool first
         if (first && tag == TAG_ORIENTATION && type == TYPE_SHORT && value >= 1 && value <= 8)
             meta->info.orientation = (int)value;
         else if (first && tag == TAG_EXIF_DIRECTORY && type == TYPE_LONG)
-            read_directory(tiff, at, false, meta);
+            exif = at;
         else if (!first && tag == TAG_EXPOSURE_TIME && type == TYPE_RATIONAL && get32(tiff, (size_t)at + 4) != 0)
             meta->exposure_s = (double)get32(tiff, at) / get32(tiff, (size_t)at + 4);
         else if (!first && tag == TAG_ISO && type == TYPE_SHORT)
             meta->iso = value;
     }
+    return exif;
 }
 
 int image_keep_exif(const struct image_source *source, const void *exif, size_t size, struct lumi_image_meta *meta)
@@ -65,7 +68,10 @@ int image_keep_exif(const struct image_source *source, const void *exif, size_t 
     memcpy(meta->exif, exif, size);
     meta->exif_size = size;
     struct tiff tiff = {meta->exif, size, meta->exif[0] == 'M'};
-    if (size >= 8 && (!memcmp(exif, "II*\0", 4) || !memcmp(exif, "MM\0*", 4)))
-        read_directory(&tiff, get32(&tiff, 4), true, meta);
+    if (size >= 8 && (!memcmp(exif, "II*\0", 4) || !memcmp(exif, "MM\0*", 4))) {
+        uint32_t directory = read_directory(&tiff, get32(&tiff, 4), true, meta);
+        if (directory > 0)
+            read_directory(&tiff, directory, false, meta);
+    }
     return LUMI_OK;
 }

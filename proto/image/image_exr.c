@@ -117,6 +117,7 @@ struct read_job {
     int channels;
     const char *names[4]; /* of the channels wanted, in the raster's order */
     const char *single;   /* the one channel asked for by name, or NULL */
+    float *spare;         /* a row for the channels not wanted */
 };
 
 static bool probe_exr(const uint8_t *data, size_t size)
@@ -189,13 +190,18 @@ static int describe(struct read_job *job, struct lumi_image_info *info)
                           job->channels, LUMI_F32, info);
 }
 
-/* Points the decoder at the chunk's place in the raster. */
+/* Points the decoder at the chunk's place in the raster. Channels that are not wanted go into a spare row: OpenEXR 3.1
+ * has unpackers that write through the NULL which should mean just that. */
 static void aim(const struct read_job *job, exr_decode_pipeline_t *decode, const struct lumi_raster *raster, int x,
                 int y)
 {
     for (int i = 0; i < decode->channel_count; i++) {
         exr_coding_channel_info_t *channel = &decode->channels[i];
-        channel->decode_to_ptr = NULL;
+        channel->decode_to_ptr = (uint8_t *)job->spare;
+        channel->user_bytes_per_element = channel->bytes_per_element;
+        channel->user_data_type = channel->data_type;
+        channel->user_pixel_stride = channel->bytes_per_element;
+        channel->user_line_stride = 0;
         for (int c = 0; c < job->channels; c++) {
             if (strcmp(channel->channel_name, job->names[c]))
                 continue;
@@ -268,10 +274,14 @@ static int read_pixels(struct read_job *job, const struct lumi_raster *raster)
     exr_decode_pipeline_t decode = EXR_DECODE_PIPELINE_INITIALIZER;
     exr_storage_t storage = EXR_STORAGE_SCANLINE;
 
+    job->spare = lumi_alloc((size_t)raster->width, sizeof *job->spare);
+    if (!job->spare)
+        return lumi_fail(job->source->error, LUMI_ERR_NOMEM, "%s: no memory for a row", job->source->name);
     exr_get_storage(job->context, 0, &storage);
     exr_result_t code =
         storage == EXR_STORAGE_TILED ? read_tiles(job, &decode, raster) : read_scanlines(job, &decode, raster);
     exr_decoding_destroy(job->context, &decode);
+    lumi_free(job->spare);
     return code == EXR_ERR_SUCCESS ? LUMI_OK : fail_exr(job->source, &job->stream, code);
 }
 

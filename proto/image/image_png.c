@@ -9,6 +9,8 @@
 #include <zlib.h>
 
 /* libpng leaves by longjmp; what it may leave behind lies in the job (see image_jpeg.c). */
+#define CHUNK_SPARE (1 << 20)
+
 struct job {
     png_structp png;
     png_infop info;
@@ -106,6 +108,9 @@ static int read_guarded(struct job *job)
         return job->code;
     png_set_read_fn(job->png, job, get_bytes);
     png_set_user_limits(job->png, LUMI_RASTER_MAX, LUMI_RASTER_MAX);
+    /* A chunk's length is believed before its bytes are seen: none is longer than the file, or inflates to much more.
+     */
+    png_set_chunk_malloc_max(job->png, (png_alloc_size_t)job->source->file_size + CHUNK_SPARE);
     png_set_crc_action(job->png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
     png_read_info(job->png, job->info);
     set_transforms(job);

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #include <cmocka.h>
 
@@ -93,7 +94,6 @@ static void flipped_bytes_never_do_harm(void **state)
 
 static void a_small_file_cannot_ask_for_much_memory(void **state)
 {
-    struct file png = encode(LUMI_IMAGE_PNG, LUMI_U8);
     struct file jpeg = encode(LUMI_IMAGE_JPEG, LUMI_U8);
     struct lumi_image_info info;
     struct lumi_error error = {0};
@@ -105,8 +105,75 @@ static void a_small_file_cannot_ask_for_much_memory(void **state)
     assert_int_equal(try_read(jpeg.data, jpeg.size), LUMI_ERR_LIMIT);
     assert_int_equal(lumi_image_info_memory(jpeg.data, jpeg.size, "photo", &info, &error), LUMI_ERR_LIMIT);
     assert_int_equal(info.width, 0);
-    lumi_free(png.data);
     lumi_free(jpeg.data);
+}
+
+static void put32(uint8_t *to, uint32_t value)
+{
+    for (int i = 0; i < 4; i++)
+        to[i] = (uint8_t)(value >> (24 - 8 * i));
+}
+
+/* A PNG with an EXIF chunk before its pixels, said to be `length` bytes long. */
+static struct file png_with_exif(const uint8_t *exif, size_t size, uint32_t length)
+{
+    enum { FRONT = 8 + 25 }; /* signature and IHDR */
+    struct file png = encode(LUMI_IMAGE_PNG, LUMI_U8);
+    struct file with = {lumi_alloc(png.size + size + 12, 1), png.size + size + 12};
+    uint8_t *chunk = with.data + FRONT;
+
+    memcpy(with.data, png.data, FRONT);
+    put32(chunk, length);
+    memcpy(chunk + 4, "eXIf", 4);
+    memcpy(chunk + 8, exif, size);
+    uint32_t crc = 0xffffffff;
+    for (size_t i = 4; i < size + 8; i++) {
+        crc ^= chunk[i];
+        for (int k = 0; k < 8; k++)
+            crc = crc >> 1 ^ (crc & 1 ? 0xedb88320 : 0);
+    }
+    put32(chunk + 8 + size, ~crc);
+    memcpy(chunk + 12 + size, png.data + FRONT, png.size - FRONT);
+    lumi_free(png.data);
+    return with;
+}
+
+/* libpng asks for as much memory as a chunk says it needs, before it looks whether the chunk is there. */
+static void a_png_chunk_longer_than_its_file_is_no_matter_of_memory(void **state)
+{
+    struct file file = png_with_exif((const uint8_t *)"II*", 4, 0x70000000);
+
+    (void)state;
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    struct rlimit before, less = {(rlim_t)1 << 30, (rlim_t)1 << 30};
+    assert_int_equal(getrlimit(RLIMIT_AS, &before), 0);
+    less.rlim_max = before.rlim_max;
+    assert_int_equal(setrlimit(RLIMIT_AS, &less), 0);
+#endif
+    assert_int_equal(try_read(file.data, file.size), LUMI_ERR_FORMAT);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
+#endif
+    lumi_free(file.data);
+}
+
+/* 65,535 entries that each lead to the directory they stand in: were each followed, this would take a minute. */
+static void an_exif_block_that_points_at_itself_is_read_once(void **state)
+{
+    enum { ENTRIES = 65535, SIZE = 8 + 2 + ENTRIES * 12 };
+    static const uint8_t front[] = {'I', 'I', '*', 0, 8, 0, 0, 0, 0xff, 0xff};
+    static const uint8_t entry[] = {0x69, 0x87, 4, 0, 1, 0, 0, 0, 8, 0, 0, 0};
+    uint8_t *exif = lumi_alloc(SIZE, 1);
+
+    (void)state;
+    memcpy(exif, front, sizeof front);
+    for (int i = 0; i < ENTRIES; i++)
+        memcpy(exif + sizeof front + (size_t)i * sizeof entry, entry, sizeof entry);
+    struct file file = png_with_exif(exif, SIZE, SIZE);
+    for (int i = 0; i < 20; i++)
+        assert_int_equal(try_read(file.data, file.size), LUMI_OK);
+    lumi_free(file.data);
+    lumi_free(exif);
 }
 
 static void what_is_no_image_is_said_to_be_none(void **state)
@@ -151,6 +218,8 @@ int main(void)
         cmocka_unit_test(every_truncation_is_an_error),
         cmocka_unit_test(flipped_bytes_never_do_harm),
         cmocka_unit_test(a_small_file_cannot_ask_for_much_memory),
+        cmocka_unit_test(a_png_chunk_longer_than_its_file_is_no_matter_of_memory),
+        cmocka_unit_test(an_exif_block_that_points_at_itself_is_read_once),
         cmocka_unit_test(what_is_no_image_is_said_to_be_none),
         cmocka_unit_test(a_missing_file_and_a_folder_are_named),
         cmocka_unit_test(running_out_of_memory_is_an_error_at_every_allocation),
