@@ -1,6 +1,7 @@
 /* A recogniser for RFC 8259 with a bounded stack: it says whether, not what. */
 #include "pipeline/exchange/json_check.h"
 
+#include <glib.h>
 #include <string.h>
 
 #define MAX_DEPTH 32
@@ -57,6 +58,30 @@ static bool is_hex(char c)
     return is_digit(c) || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
 }
 
+/* The four digits after "\\u". Halves of surrogate pairs that stand alone are no characters: they would come back as
+ * broken text. */
+static bool take_code_unit(struct scan *scan, unsigned *unit)
+{
+    *unit = 0;
+    for (int i = 0; i < 4; i++, scan->at++) {
+        if (scan->at >= scan->end || !is_hex(*scan->at))
+            return false;
+        *unit = *unit << 4 | (unsigned)g_ascii_xdigit_value(*scan->at);
+    }
+    return true;
+}
+
+static bool take_escaped_character(struct scan *scan)
+{
+    unsigned first, second;
+
+    if (!take_code_unit(scan, &first) || (first & 0xfc00) == 0xdc00)
+        return false;
+    if ((first & 0xfc00) != 0xd800)
+        return true;
+    return take(scan, '\\') && take(scan, 'u') && take_code_unit(scan, &second) && (second & 0xfc00) == 0xdc00;
+}
+
 static bool take_string(struct scan *scan)
 {
     if (!take(scan, '"'))
@@ -71,11 +96,8 @@ static bool take_string(struct scan *scan)
             continue;
         if (scan->at >= scan->end || !strchr("\"\\/bfnrtu", *scan->at) || !*scan->at)
             return false;
-        if (*scan->at++ != 'u')
-            continue;
-        for (int i = 0; i < 4; i++, scan->at++)
-            if (scan->at >= scan->end || !is_hex(*scan->at))
-                return false;
+        if (*scan->at++ == 'u' && !take_escaped_character(scan))
+            return false;
     }
     return false;
 }

@@ -139,6 +139,23 @@ static void nested_json_is_refused_before_it_is_parsed(void **state)
     assert_false(lumi_json_check("\"a", 2));
 }
 
+static bool json_is_good(const char *text)
+{
+    return lumi_json_check(text, strlen(text));
+}
+
+static void half_of_a_surrogate_pair_is_no_text(void **state)
+{
+    (void)state;
+    assert_true(json_is_good("\"\\ud83d\\ude00\""));
+    assert_false(json_is_good("\"\\ud83d\""));
+    assert_false(json_is_good("\"\\ude00\""));
+    assert_false(json_is_good("\"\\ud83dx\""));
+    assert_false(json_is_good("\"\\ud83d\\n\""));
+    assert_false(json_is_good("\"\\ud83d\\ud83d\""));
+    assert_false(json_is_good("\"\\ud83d\\u"));
+}
+
 static void transforms_are_written_so_that_reading_gives_the_same_numbers(void **state)
 {
     static const char *const texts[] = {
@@ -315,6 +332,7 @@ int main(void)
         cmocka_unit_test(a_frame_may_have_a_camera_of_its_own),
         cmocka_unit_test(bad_transforms_are_refused_with_one_line),
         cmocka_unit_test(nested_json_is_refused_before_it_is_parsed),
+        cmocka_unit_test(half_of_a_surrogate_pair_is_no_text),
         cmocka_unit_test(transforms_are_written_so_that_reading_gives_the_same_numbers),
         cmocka_unit_test(colmap_poses_are_turned_round),
         cmocka_unit_test(colmap_models_come_back_bit_for_bit),
