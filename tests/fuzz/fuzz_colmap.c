@@ -1,11 +1,8 @@
 /* A COLMAP model from memory. The first byte's lowest bit: binary or text; the next two: the bytes of the cameras; then
  * cameras and images. */
+#include "checks.h"
+
 #include "pipeline/exchange/exchange.h"
-
-#include <stdint.h>
-#include <stdlib.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void check(const struct lumi_exchange *list)
 {
@@ -40,6 +37,7 @@ static void write_and_read(const struct lumi_exchange *list, bool binary)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     g_autoptr(GHashTable) table = g_hash_table_new(NULL, NULL);
+    struct lumi_error error = {0};
     struct lumi_exchange list;
 
     if (size < 3)
@@ -48,9 +46,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     size_t split = (size_t)data[1] + ((size_t)data[2] << 8);
     split = split < size - 3 ? split : size - 3;
     lumi_exchange_init(&list);
-    if (lumi_exchange_parse_colmap_cameras(data + 3, split, binary, "fuzz", table, &list, NULL) == LUMI_OK &&
-        lumi_exchange_parse_colmap_images(data + 3 + split, size - 3 - split, binary, "fuzz", table, &list, NULL) ==
-            LUMI_OK) {
+    int code = lumi_exchange_parse_colmap_cameras(data + 3, split, binary, "fuzz", table, &list, &error);
+    if (code == LUMI_OK)
+        code =
+            lumi_exchange_parse_colmap_images(data + 3 + split, size - 3 - split, binary, "fuzz", table, &list, &error);
+    if (checked(code, &error) == LUMI_OK) {
         check(&list);
         write_and_read(&list, true);
     }

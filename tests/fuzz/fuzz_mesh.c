@@ -1,10 +1,19 @@
 /* The decoder of meshes against any bytes; what it accepts is within its limits and survives a round trip. */
+#include "checks.h"
+
 #include "proto/lightfield/mesh.h"
 
-#include <stdlib.h>
-#include <string.h>
+/* The same bytes where memory ends: an error, or the mesh. */
+static void decode(const uint8_t *data, size_t size)
+{
+    struct lumi_error error = {0};
+    struct lumi_view_mesh mesh;
+    struct lumi_reader reader;
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+    lumi_reader_init(&reader, data + 2, size - 2);
+    if (checked(lumi_view_mesh_decode(&reader, 1 + data[0] % 8, 1 + data[1] % 8, &mesh, &error), &error) == LUMI_OK)
+        lumi_view_mesh_finish(&mesh);
+}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
@@ -15,6 +24,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (size < 2)
         return 0;
     const int cols = 1 + data[0] % 8, rows = 1 + data[1] % 8;
+    with_and_without_memory(data, size, decode);
     lumi_reader_init(&reader, data + 2, size - 2);
     if (lumi_view_mesh_decode(&reader, cols, rows, &mesh, NULL) != LUMI_OK)
         return 0;

@@ -1,20 +1,17 @@
 /* The parser of rig profiles. What it takes must be printable, parse again to the same numbers, and give poses. */
+#include "checks.h"
+
 #include "proto/mechanism/kinematics.h"
 #include "proto/mechanism/rig.h"
-
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static char text[LUMI_RIG_TEXT_MAX];
+    struct lumi_error error = {0};
     struct lumi_rig rig, back;
     struct lumi_pose pose;
 
-    if (lumi_rig_parse((const char *)data, size, "fuzz", &rig, NULL) != LUMI_OK)
+    if (checked(lumi_rig_parse((const char *)data, size, "fuzz", &rig, &error), &error) != LUMI_OK)
         return 0;
     size_t length = lumi_rig_print(&rig, text, sizeof text);
     if (length >= sizeof text || lumi_rig_parse(text, length, "fuzz", &back, NULL) != LUMI_OK ||

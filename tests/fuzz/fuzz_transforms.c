@@ -1,11 +1,7 @@
 /* transforms.json from memory: what is accepted is sound, and written and read again is the same. */
+#include "checks.h"
+
 #include "pipeline/exchange/exchange.h"
-
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void check(const struct lumi_exchange *list)
 {
@@ -33,7 +29,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
     lumi_exchange_init(&list);
     lumi_exchange_init(&again);
-    if (lumi_exchange_parse_transforms((const char *)data, size, "fuzz", &list, &error) == LUMI_OK) {
+    if (checked(lumi_exchange_parse_transforms((const char *)data, size, "fuzz", &list, &error), &error) == LUMI_OK) {
         g_autofree char *text = NULL;
         check(&list);
         if (complete(&list) && lumi_exchange_format_transforms(&list, &text, &error) == LUMI_OK &&
