@@ -92,7 +92,7 @@ static struct corner corner_of(const struct lumi_view_mesh *mesh, int tile, int 
                            lumi_mesh_inverse_depth(mesh, &mesh->tiles[tile], v->d)};
 }
 
-/* Shaded by depth, dark within half a pixel of its edges. */
+/* Shaded by depth, dark where an edge is within half a pixel (tile edges lie between pixels). */
 static void draw_triangle(const struct corner c[3], const struct range *range, const struct lumi_raster *out)
 {
     double area = (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x);
@@ -119,7 +119,7 @@ static void draw_triangle(const struct corner c[3], const struct range *range, c
             if (edge < -1e-9)
                 continue;
             colour_of(range, (float)w, pixel);
-            for (int k = 0; edge < 0.5 && k < 3; k++)
+            for (int k = 0; edge < 0.51 && k < 3; k++)
                 pixel[k] = (uint8_t)(pixel[k] / 4);
         }
 }

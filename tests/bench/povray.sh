@@ -4,7 +4,7 @@
 # for the disks and for the best single plane.
 #
 # usage: povray.sh BUILD [DIR]   (DIR: kept, its photographs used again; a temporary folder that is removed otherwise)
-# About 8 core-minutes, most of them POV-Ray's. Exits with 77 where POV-Ray or its examples are missing.
+# About 8 core-minutes, half of them POV-Ray's. Exits with 77 where POV-Ray or its examples are missing.
 set -eu
 . "$(dirname "$0")/functions"
 lumi=$(realpath "$1/cli/lumi")
@@ -49,7 +49,7 @@ shoot() { # FOLDER WIDTH HEIGHT
     [ ! -e "$1/0000.png" ] || return 0
     n=$(cat "$1/count")
     scene > "$1/scene.pov"
-    (cd "$1" && povray +Iscene.pov +Oframe.png "+W$2" "+H$3" -D +A0.1 +AM2 +R3 -J +KFI0 "+KFF$((n - 1))" +KI0 +KF1 \
+    (cd "$1" && povray +Iscene.pov +Oframe.png "+W$2" "+H$3" -D +A0.1 +AM1 +R2 -J +KFI0 "+KFF$((n - 1))" +KI0 +KF1 \
         >povray.log 2>&1) || { tail -5 "$1/povray.log"; exit 1; }
     i=0
     for f in "$1"/frame*.png; do
@@ -78,21 +78,22 @@ plane='BEGIN {
 awk -v a=2 -v s=1 "$plane" | write_poses "$dir/planar-input" 384 288 50
 awk -v a=1.5 -v s=2 "$plane" | write_poses "$dir/planar-truth" 384 288 50
 
-# Outward: a sphere of 5 cm radius between the tin and the cup, 7 rows of 18, looking out; truth from eyes inside it.
+# Outward: a sphere of 5 cm radius between the tin and the cup, 18 columns of 5 rows from 75 degrees down to 25 up, looking
+# out; truth from eyes inside it that look down, with the frames' pixel density.
 awk 'BEGIN { pi = atan2(0, -1)
-    for (r = 0; r < 7; r++) for (c = 0; c < 18; c++) {
+    for (r = 0; r < 5; r++) for (c = 0; c < 18; c++) {
         t = (-75 + 25 * r) * pi / 180; q = 2 * pi * c / 18
         x = cos(t) * cos(q); y = cos(t) * sin(q); z = sin(t)
         print .02 + .05 * x, -.02 + .05 * y, .11 + .05 * z, x, y, z } }' | write_poses "$dir/outward-input" 256 256 95
 awk 'BEGIN { pi = atan2(0, -1)
     for (c = 0; c < 8; c++) { q = 2 * pi * c / 8 + .2; t = -.25 - .2 * (c % 3)
         print .02 + .02 * cos(2.4 * c), -.02 + .02 * sin(2.4 * c), .11 + .01 * (c % 3 - 1), cos(t) * cos(q), cos(t) * sin(q), sin(t) } }' |
-    write_poses "$dir/outward-truth" 256 192 70
+    write_poses "$dir/outward-truth" 192 144 70
 
 shoot "$dir/planar-input" 384 288
 shoot "$dir/planar-truth" 384 288
 shoot "$dir/outward-input" 256 256
-shoot "$dir/outward-truth" 256 192
+shoot "$dir/outward-truth" 192 144
 field planar
 field outward
 machine
