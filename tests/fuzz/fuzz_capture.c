@@ -21,6 +21,8 @@ static void read_all(struct lumi_capture *capture)
     if (lumi_capture_get_plan(capture, &long_text, NULL) == LUMI_OK)
         lumi_free(long_text);
     checked(lumi_capture_info(capture, &info, &error), &error);
+    checked(lumi_capture_lens(capture, 1, &lens, &error), &error);
+    checked(lumi_capture_lens(capture, 77, &lens, &error), &error);
     if (checked(lumi_capture_frames(capture, LUMI_FRAMES_ALL, &frames, &count, &error), &error) != LUMI_OK)
         return;
     for (int i = 0; i < count; i++) {

@@ -56,7 +56,8 @@ static void decode_all(const struct lumi_field *field, const char *name, bool me
             const struct lumi_grid *grid = lumi_field_grid(field, lumi_field_view(field, level, view)->grid);
             for (int i = 0; i < grid->cols * grid->rows; i++) {
                 struct lumi_error error = {0};
-                int code = lumi_field_decode_tile(decoder, level, view, i % grid->cols, i / grid->cols, &pixels, &error);
+                int code =
+                    lumi_field_decode_tile(decoder, level, view, i % grid->cols, i / grid->cols, &pixels, &error);
                 if (code != LUMI_OK && code != LUMI_ERR_CHECKSUM && !(mended && code == LUMI_ERR_FORMAT))
                     fail_msg("%s: tile %d of view %d: code %d, %s", name, i, view, code, error.text);
                 tally->tiles++;
