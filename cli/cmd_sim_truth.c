@@ -26,9 +26,11 @@ static const GOptionEntry options[] = {
     {"volume", 0, 0, G_OPTION_ARG_DOUBLE, &volume, "radius in metres within which random eyes are (0.6 of the rig's)",
      "R"},
     {"stereo", 0, 0, G_OPTION_ARG_DOUBLE, &eye_distance,
-     "with --random, one view more: the right eye, so far from the first view, which is the left one", "METRES"},
+     "with --random, one view more, the second: the right eye, so far from the first view, which is the left one",
+     "METRES"},
     {"fov", 0, 0, G_OPTION_ARG_DOUBLE, &fov, "horizontal field of view in degrees", "DEGREES"},
-    {"size", 0, 0, G_OPTION_ARG_STRING, &size_text, "size of the views in pixels", "WxH"},
+    {"size", 0, 0, G_OPTION_ARG_STRING, &size_text,
+     "size of the views in pixels (with --random: 4 by 3, as many pixels a degree as the rig's pictures)", "WxH"},
     {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale, "shrinks a rig's counts and resolution (1)", "S"},
     {"lens", 0, 0, G_OPTION_ARG_STRING, &lens_text, "pinhole, brown or fisheye, for planar and sphere", "LENS"},
     {"inward", 0, 0, G_OPTION_ARG_NONE, &inward, "a sphere's cameras look at its centre", NULL},
@@ -96,8 +98,8 @@ static int choose_views(struct sim_rig *views, struct lumi_error *error)
     else
         LUMI_TRY(sim_rig_init(&around, rig_text, &rig_options, error));
     struct sim_random_options random = {.count = random_count,
-                                        .width = size[0] ? size[0] : 640,
-                                        .height = size[1] ? size[1] : 480,
+                                        .width = size[0],
+                                        .height = size[1],
                                         .fov = fov > 0         ? fov
                                                : around.plane  ? 50
                                                : around.inward ? 40

@@ -240,23 +240,30 @@ int sim_rig_random(const struct sim_rig *around, const struct sim_random_options
     int count = o->count + (o->eye_distance > 0);
 
     *result = (struct sim_rig){.count = count, .rows = 1, .columns = count, .cameras = 1};
-    if (o->count < 1 || o->count > VIEWS_MAX || o->width < 1 || o->height < 1 || !(o->fov > 0 && o->fov < 179))
+    if (o->count < 1 || o->count > VIEWS_MAX || o->width < 0 || o->height < 0 || !(o->fov > 0 && o->fov < 179))
         return lumi_fail(error, LUMI_ERR_ARG, "random views: count, size or field of view out of range");
+    /* In the middle as many pixels a radian as the pictures, 4 by 3. */
+    double half = around->views[0].lens.fx * tan(o->fov * DEGREE / 2);
+    int width = o->width ? o->width : (int)fmin(2 * round(half), LUMI_RASTER_MAX);
+    int height = o->height ? o->height : (int)fmin(2 * round(0.75 * half), LUMI_RASTER_MAX);
+    if (width < 1 || height < 1)
+        return lumi_fail(error, LUMI_ERR_ARG, "random views: the rig's pictures leave them no pixels");
     LUMI_TRY(allocate(result, error));
     double volume = o->volume > 0 ? o->volume : 0.6 * around->radius;
     for (int i = 0; i < o->count; i++) {
-        struct sim_view *view = &result->views[i];
-        *view = (struct sim_view){.column = i, .position = i};
-        lumi_lens_init_pinhole(&view->lens, o->width, o->height, o->fov * DEGREE);
+        int place = i > 0 && o->eye_distance > 0 ? i + 1 : i;
+        struct sim_view *view = &result->views[place];
+        *view = (struct sim_view){.column = place, .position = place};
+        lumi_lens_init_pinhole(&view->lens, width, height, o->fov * DEGREE);
         if (around->plane)
             random_in_grid(around, o->seed, i, &view->pose);
         else
             random_in_ball(around, volume, o->seed, i, &view->pose);
     }
     if (o->eye_distance > 0) {
-        struct sim_view *right = &result->views[o->count];
+        struct sim_view *right = &result->views[1];
         *right = result->views[0];
-        right->column = right->position = o->count;
+        right->column = right->position = 1;
         right->pose.t = lumi_add(right->pose.t, lumi_scale(lumi_axis(&right->pose, 0), o->eye_distance));
     }
     return LUMI_OK;

@@ -60,9 +60,10 @@ int sim_rig_from_capture(struct sim_rig *rig, const char *path, struct lumi_erro
  * 0.6 of the radius), or inside the grid; directions up to 45° above and below the horizon, or 8° off straight ahead.
  */
 struct sim_random_options {
-    int count, width, height;
+    int count;
+    int width, height;   /* 0: 4 by 3, in the middle as many pixels a radian as the rig's own pictures have */
     double fov, volume;  /* degrees, metres */
-    double eye_distance; /* metres; above 0 one more view follows: the right eye where the first view is the left one */
+    double eye_distance; /* metres; above 0 the second view is the right eye of the first and comes on top of `count` */
     uint64_t seed;
 };
 int sim_rig_random(const struct sim_rig *around, const struct sim_random_options *options, struct sim_rig *result,

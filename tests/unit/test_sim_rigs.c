@@ -159,6 +159,33 @@ static void random_views_are_inside_the_volume_and_follow_the_seed(void **state)
     sim_rig_finish(&a);
 }
 
+static void random_views_are_as_fine_as_the_pictures_and_the_second_eye_is_to_the_right(void **state)
+{
+    struct sim_rig rig, alone, pair;
+    struct sim_random_options options = {.count = 3, .fov = 90, .seed = 5};
+
+    (void)state;
+    make(&rig, "arc16", 0.25);
+    assert_int_equal(sim_rig_random(&rig, &options, &alone, NULL), LUMI_OK);
+    options.eye_distance = 0.064;
+    assert_int_equal(sim_rig_random(&rig, &options, &pair, NULL), LUMI_OK);
+    assert_int_equal(alone.count, 3);
+    assert_int_equal(pair.count, 4);
+    double ratio = alone.views[0].lens.fx / rig.views[0].lens.fx;
+    assert_true(ratio > 0.99 && ratio < 1.01);
+    assert_true(abs(4 * alone.views[0].lens.height - 3 * alone.views[0].lens.width) <= 8);
+    const struct lumi_pose *left = &pair.views[0].pose, *right = &pair.views[1].pose;
+    assert_memory_equal(left, &alone.views[0].pose, sizeof *left);
+    assert_memory_equal(left->r, right->r, sizeof left->r);
+    struct lumi_vec3 apart = lumi_sub(right->t, left->t);
+    assert_true(fabs(lumi_dot(apart, lumi_axis(left, 0)) - 0.064) < 1e-12 && lumi_length(apart) < 0.064 + 1e-12);
+    assert_memory_equal(&pair.views[2].pose, &alone.views[1].pose, sizeof *left);
+    assert_memory_equal(&pair.views[3].pose, &alone.views[2].pose, sizeof *left);
+    sim_rig_finish(&rig);
+    sim_rig_finish(&alone);
+    sim_rig_finish(&pair);
+}
+
 static void what_is_no_rig_is_refused(void **state)
 {
     static const char *const wrong[] = {"",           "arc17",         "planar:3:0.1",        "planar:0x3:0.1",
@@ -189,6 +216,7 @@ int main(void)
         cmocka_unit_test(a_planar_grid_spans_the_plane_and_looks_along_y),
         cmocka_unit_test(a_sphere_looks_out_or_in),
         cmocka_unit_test(random_views_are_inside_the_volume_and_follow_the_seed),
+        cmocka_unit_test(random_views_are_as_fine_as_the_pictures_and_the_second_eye_is_to_the_right),
         cmocka_unit_test(what_is_no_rig_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
