@@ -9,6 +9,7 @@
 #include "proto/lightfield/reference_code.h"
 
 #include <glib.h>
+#include <pthread.h>
 #include <string.h>
 
 enum { PIECES_VERSION = 1 }; /* raise it when the same inputs give other bytes */
@@ -235,7 +236,7 @@ int compress_level_cluster(const struct compress_level *level, int cluster, stru
 /* The work of several threads, whose first error (by item) counts. */
 struct work {
     struct compress_level *level;
-    GMutex lock; /* guards what follows, and level->done */
+    pthread_mutex_t lock; /* guards what follows, and level->done */
     int failed_item;
     struct lumi_error *error;
 };
@@ -244,7 +245,7 @@ static int note(struct work *work, int item, int code, const struct lumi_error *
 {
     struct compress_level *level = work->level;
 
-    g_mutex_lock(&work->lock);
+    pthread_mutex_lock(&work->lock);
     if (code != LUMI_OK && item < work->failed_item) {
         work->failed_item = item;
         if (work->error)
@@ -254,7 +255,7 @@ static int note(struct work *work, int item, int code, const struct lumi_error *
     if (code == LUMI_OK && level->run->progress)
         level->run->progress(level->index == LUMI_LEVEL_COARSE ? "compress coarse" : "compress", level->done,
                              level->total);
-    g_mutex_unlock(&work->lock);
+    pthread_mutex_unlock(&work->lock);
     return code;
 }
 
@@ -262,9 +263,9 @@ static int for_each(struct compress_level *level, int count, lumi_parallel_fn fn
 {
     struct work work = {.level = level, .failed_item = G_MAXINT, .error = error};
 
-    g_mutex_init(&work.lock);
+    pthread_mutex_init(&work.lock, NULL);
     int code = lumi_parallel_for(count, level->run->threads, fn, &work);
-    g_mutex_clear(&work.lock);
+    pthread_mutex_destroy(&work.lock);
     return code;
 }
 

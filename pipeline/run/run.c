@@ -7,14 +7,15 @@
 #include <fcntl.h>
 #include <glib.h>
 #include <glib/gstdio.h>
+#include <pthread.h>
 #include <string.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 struct lumi_run_private {
-    int lock;         /* the work directory's lock file */
-    GMutex mutex;     /* guards keys */
-    GHashTable *keys; /* "stage/index" → hex key */
+    int lock;              /* the work directory's lock file */
+    pthread_mutex_t mutex; /* guards keys */
+    GHashTable *keys;      /* "stage/index" → hex key */
 };
 
 void lumi_run_defaults(struct lumi_parameters *parameters)
@@ -36,20 +37,20 @@ void lumi_run_remember_key(const struct lumi_run *run, const char *stage, int in
 {
     struct lumi_run_private *priv = run->priv;
 
-    g_mutex_lock(&priv->mutex);
+    pthread_mutex_lock(&priv->mutex);
     g_hash_table_replace(priv->keys, g_strdup_printf("%s/%d", stage, index), g_strdup(hex));
-    g_mutex_unlock(&priv->mutex);
+    pthread_mutex_unlock(&priv->mutex);
 }
 
 bool lumi_run_output_key(const struct lumi_run *run, const char *stage, int index, char *hex)
 {
     g_autofree char *name = g_strdup_printf("%s/%d", stage, index);
 
-    g_mutex_lock(&run->priv->mutex);
+    pthread_mutex_lock(&run->priv->mutex);
     const char *known = g_hash_table_lookup(run->priv->keys, name);
     if (known)
         g_strlcpy(hex, known, LUMI_KEY_HEX);
-    g_mutex_unlock(&run->priv->mutex);
+    pthread_mutex_unlock(&run->priv->mutex);
     if (known)
         return true;
     g_autofree char *path = lumi_run_path(run, stage, index, ".key");
@@ -118,7 +119,7 @@ int lumi_run_open(const char *capture, const char *work, const struct lumi_param
     *result = NULL;
     run->priv = g_new0(struct lumi_run_private, 1);
     run->priv->lock = -1;
-    g_mutex_init(&run->priv->mutex);
+    pthread_mutex_init(&run->priv->mutex, NULL);
     run->priv->keys = g_hash_table_new_full(g_str_hash, g_str_equal, g_free, g_free);
     run->capture = strip_slashes(capture);
     run->work = work ? strip_slashes(work) : g_strconcat(run->capture, ".work", NULL);
@@ -143,7 +144,7 @@ void lumi_run_close(struct lumi_run *run)
     if (run->priv->lock >= 0)
         close(run->priv->lock);
     g_hash_table_destroy(run->priv->keys);
-    g_mutex_clear(&run->priv->mutex);
+    pthread_mutex_destroy(&run->priv->mutex);
     g_free(run->priv);
     g_free(run->capture);
     g_free(run->work);

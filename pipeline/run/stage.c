@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <glib.h>
 #include <glib/gstdio.h>
+#include <pthread.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -45,7 +46,7 @@ struct work {
     const struct lumi_stage *stage;
     void *state;
     GArray *jobs;
-    GMutex lock; /* guards done, error_index, error */
+    pthread_mutex_t lock; /* guards done, error_index, error */
     long done;
     int error_index;
     struct lumi_error *error;
@@ -82,7 +83,7 @@ static int run_job(void *context, int number, int thread)
     const struct job *job = &g_array_index(work->jobs, struct job, number);
     int code = make_one(work, job, thread, &error);
 
-    g_mutex_lock(&work->lock);
+    pthread_mutex_lock(&work->lock);
     if (code != LUMI_OK && number < work->error_index) {
         work->error_index = number;
         if (work->error)
@@ -91,7 +92,7 @@ static int run_job(void *context, int number, int thread)
     work->done++;
     if (code == LUMI_OK && work->run->progress)
         work->run->progress(work->stage->title, work->done, work->jobs->len);
-    g_mutex_unlock(&work->lock);
+    pthread_mutex_unlock(&work->lock);
     return code;
 }
 
@@ -139,9 +140,9 @@ int lumi_run_stage(struct lumi_run *run, const struct lumi_stage *stage, int fir
         return LUMI_OK;
     if (stage->begin)
         LUMI_TRY(stage->begin(run, &work.state, error));
-    g_mutex_init(&work.lock);
+    pthread_mutex_init(&work.lock, NULL);
     code = lumi_parallel_for((int)jobs->len, stage->serial || stage->whole ? 1 : run->threads, run_job, &work);
-    g_mutex_clear(&work.lock);
+    pthread_mutex_destroy(&work.lock);
     if (stage->end)
         stage->end(run, work.state);
     return code;
