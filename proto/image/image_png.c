@@ -9,7 +9,8 @@
 #include <zlib.h>
 
 /* libpng leaves by longjmp; what it may leave behind lies in the job (see image_jpeg.c). */
-#define CHUNK_SPARE (1 << 20)
+/* What libpng needs at once beside the chunks of a file: rows, inflated texts. */
+#define MEMORY_SPARE (8 << 20)
 
 struct job {
     png_structp png;
@@ -44,9 +45,13 @@ static void on_warning(png_structp png, png_const_charp text)
     (void)text;
 }
 
+/* libpng asks for as much as a chunk says it holds, before its bytes are seen: nothing is longer than its file. */
 static png_voidp get_memory(png_structp png, png_alloc_size_t size)
 {
-    (void)png;
+    const struct job *job = png_get_mem_ptr(png);
+
+    if (job->source && size > job->source->file_size + MEMORY_SPARE)
+        return NULL;
     return lumi_alloc(size, 1);
 }
 
@@ -108,9 +113,6 @@ static int read_guarded(struct job *job)
         return job->code;
     png_set_read_fn(job->png, job, get_bytes);
     png_set_user_limits(job->png, LUMI_RASTER_MAX, LUMI_RASTER_MAX);
-    /* A chunk's length is believed before its bytes are seen: none is longer than the file, or inflates to much more.
-     */
-    png_set_chunk_malloc_max(job->png, (png_alloc_size_t)job->source->file_size + CHUNK_SPARE);
     png_set_crc_action(job->png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
     png_read_info(job->png, job->info);
     set_transforms(job);
@@ -134,7 +136,7 @@ static int read_png(const struct image_source *source, struct lumi_raster *raste
     struct job job = {.name = source->name, .error = source->error, .source = source, .raster = raster, .meta = meta};
 
     job.png =
-        png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning, NULL, get_memory, release_memory);
+        png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning, &job, get_memory, release_memory);
     job.info = job.png ? png_create_info_struct(job.png) : NULL;
     int code = job.info ? read_guarded(&job) : lumi_fail(source->error, LUMI_ERR_NOMEM, "%s: no memory", source->name);
     png_destroy_read_struct(&job.png, &job.info, NULL);
@@ -198,7 +200,7 @@ static int encode_png(const struct lumi_raster *raster, const struct lumi_image_
     if (options->exif_size > 0 && options->exif_size > 0x7fffffff)
         return lumi_fail(error, LUMI_ERR_ARG, "an EXIF block of %zu bytes does not fit a PNG", options->exif_size);
     job.png =
-        png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning, NULL, get_memory, release_memory);
+        png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning, &job, get_memory, release_memory);
     job.info = job.png ? png_create_info_struct(job.png) : NULL;
     int code = job.info ? write_guarded(&job) : lumi_fail(error, LUMI_ERR_NOMEM, "no memory to write the image");
     png_destroy_write_struct(&job.png, &job.info);
