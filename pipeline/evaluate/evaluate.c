@@ -129,11 +129,12 @@ static int write_difference(const char *folder, const char *name, const struct l
     return lumi_image_write(path, difference, NULL, error);
 }
 
+/* Spread over all views, the first always among them. */
 static bool on_sheet(const struct lumi_evaluate_options *options, int index, int count)
 {
     int most = options->sheet_views > 0 && options->sheet_views < count ? options->sheet_views : count;
 
-    return options->sheet && (long)index * most / count != (long)(index - 1) * most / count + (index == 0 ? 1 : 0);
+    return options->sheet && (index == 0 || (long)index * most / count != (long)(index - 1) * most / count);
 }
 
 static int evaluate_view(struct lumi_renderer *renderer, const struct lumi_truth *truth,

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CELL_WIDTH 320 /* pixels; heights follow */
+#define CELL_WIDTH 320 /* pixels at most; heights follow */
 #define GAP 4
 #define VIEWS_ABREAST 2
 #define EACH 3 /* truth, rendering, difference */
@@ -81,22 +81,25 @@ static void paste(const struct lumi_raster *page, const struct lumi_raster *cell
 int lumi_sheet_write(const struct lumi_sheet *sheet, const char *path, struct lumi_error *error)
 {
     const int across = VIEWS_ABREAST * EACH;
-    int rows = (sheet->count + across - 1) / across, cell_height = 1;
+    int rows = (sheet->count + across - 1) / across, cell_width = 1, cell_height = 1;
     struct lumi_raster page;
 
     if (sheet->count == 0)
         return lumi_fail(error, LUMI_ERR_ARG, "%s: no pictures for the contact sheet", path);
-    for (int i = 0; i < sheet->count; i++)
+    for (int i = 0; i < sheet->count; i++) {
+        if (sheet->cells[i].width > cell_width)
+            cell_width = sheet->cells[i].width;
         if (sheet->cells[i].height > cell_height)
             cell_height = sheet->cells[i].height;
+    }
     int abreast = sheet->count < across ? sheet->count : across;
-    if (lumi_raster_create(&page, abreast * (CELL_WIDTH + GAP) + GAP, rows * (cell_height + GAP) + GAP, 3, LUMI_U8) !=
+    if (lumi_raster_create(&page, abreast * (cell_width + GAP) + GAP, rows * (cell_height + GAP) + GAP, 3, LUMI_U8) !=
         LUMI_OK)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory for a contact sheet of %d pictures", path, sheet->count);
     for (int y = 0; y < page.height; y++)
         memset(lumi_row_u8(&page, y), 255, 3 * (size_t)page.width);
     for (int i = 0; i < sheet->count; i++)
-        paste(&page, &sheet->cells[i], GAP + i % across * (CELL_WIDTH + GAP), GAP + i / across * (cell_height + GAP));
+        paste(&page, &sheet->cells[i], GAP + i % across * (cell_width + GAP), GAP + i / across * (cell_height + GAP));
     int code = lumi_image_write(path, &page, NULL, error);
     lumi_raster_finish(&page);
     return code;
