@@ -3,22 +3,21 @@
 
 #include "pipeline/compress/level.h"
 #include "pipeline/geometry/disks.h"
+#include "pipeline/run/key.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/lightfield/field_write.h"
 
+#include <errno.h>
 #include <glib.h>
 #include <glib/gstdio.h>
 #include <string.h>
 
-static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
+/* What a field depends on besides its quality. */
+static void key_content(struct lumi_run *run, struct lumi_key *k)
 {
     const struct lumi_parameters *parameters = &run->parameters;
 
-    (void)index;
-    (void)error;
-    lumi_key_int(k, parameters->quality);
-    lumi_key_int(k, parameters->target_bytes);
     lumi_key_int(k, parameters->cluster_size);
     lumi_key_int(k, parameters->disk_shape);
     lumi_key_int(k, parameters->kernel);
@@ -31,6 +30,15 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
         lumi_key_input(k, run, "geometry", i);
         lumi_key_input(k, run, "geometry-coarse", i);
     }
+}
+
+static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
+{
+    (void)index;
+    (void)error;
+    lumi_key_int(k, run->parameters.quality);
+    lumi_key_int(k, run->parameters.target_bytes);
+    key_content(run, k);
     return LUMI_OK;
 }
 
@@ -157,23 +165,53 @@ static int file_size(const char *path, long long *size, struct lumi_error *error
     return LUMI_OK;
 }
 
+/* The size of the field at a quality; once known, it is kept in a file, so that a search that was stopped need not code
+ * everything again. *written: whether the field now lies at `path`. */
+static int size_at(struct lumi_run *run, int quality, const char *path, long long *size, bool *written,
+                   struct lumi_error *error)
+{
+    g_autofree char *all = lumi_run_path(run, "compress", -1, ""), *folder = g_path_get_dirname(all);
+    g_autofree char *kept = g_strdup_printf("%s/size-%03d.txt", folder, quality);
+    g_autofree char *kept_key = g_strdup_printf("%s/size-%03d.key", folder, quality), *text = NULL;
+    char hex[LUMI_KEY_HEX], there[LUMI_KEY_HEX];
+    struct lumi_key k;
+
+    lumi_key_init(&k, "compress-size", lumi_stage_compress.version);
+    lumi_key_int(&k, quality);
+    key_content(run, &k);
+    lumi_key_hex(&k, hex);
+    *written = false;
+    if (lumi_key_load(kept_key, there) && !strcmp(there, hex) && g_file_get_contents(kept, &text, NULL, NULL)) {
+        *size = g_ascii_strtoll(text, NULL, 10);
+        return LUMI_OK;
+    }
+    LUMI_TRY(write_at(run, quality, path, error));
+    *written = true;
+    LUMI_TRY(file_size(path, size, error));
+    text = g_strdup_printf("%lld\n", *size);
+    if (g_unlink(kept_key) && errno != ENOENT)
+        return lumi_fail_errno(error, kept_key, "remove");
+    LUMI_TRY(lumi_file_write(kept, text, strlen(text), false, error));
+    return lumi_key_save(kept_key, kept, hex, error);
+}
+
 /* The highest quality whose file is no larger than `target`: bisection, since larger quality makes larger files. */
 static int write_within(struct lumi_run *run, long long target, const char *path, struct lumi_error *error)
 {
-    int low = 0, high = 100, written = -1;
+    int low = 0, high = 100, at_path = -1;
     long long size = 0;
+    bool written;
 
     while (low < high) {
         int middle = (low + high + 1) / 2;
-        LUMI_TRY(write_at(run, middle, path, error));
-        LUMI_TRY(file_size(path, &size, error));
-        written = middle;
+        LUMI_TRY(size_at(run, middle, path, &size, &written, error));
+        at_path = written ? middle : at_path;
         if (size <= target)
             low = middle;
         else
             high = middle - 1;
     }
-    if (written != low)
+    if (at_path != low)
         LUMI_TRY(write_at(run, low, path, error));
     LUMI_TRY(file_size(path, &size, error));
     if (size > target)

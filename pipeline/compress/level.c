@@ -8,17 +8,20 @@
 #include "proto/lightfield/cluster_code.h"
 #include "proto/lightfield/reference_code.h"
 
+#include <errno.h>
 #include <glib.h>
 #include <pthread.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { PIECES_VERSION = 1 }; /* raise it when the same inputs give other bytes */
 
 void compress_quality_init(struct compress_quality *quality, int value)
 {
-    int quantizer = (100 - value) * 4 / 5;
+    const int coarseness = 100 - CLAMP(value, 0, 100);
+    /* Steps of four fifths as far as 48, which is coarse already, then smaller ones, so that each end is an end. */
+    const int quantizer = coarseness <= 60 ? coarseness * 4 / 5 : 48 + (coarseness - 60) * 15 / 40;
 
-    quantizer = quantizer < 0 ? 0 : quantizer > 63 ? 63 : quantizer;
     *quality = (struct compress_quality){
         .tile_quantizer = quantizer, .reference_quantizer = quantizer / 3, .speed = 2, .range = 16};
 }
@@ -162,11 +165,13 @@ static int piece_save(const struct compress_level *level, const char *kind, int 
 
     if (bytes->failed)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory for it", path);
+    /* The old key goes first, so that it never stands beside new bytes. */
+    if (unlink(key) && errno != ENOENT)
+        return lumi_fail_errno(error, key, "remove");
     LUMI_TRY(lumi_file_write(path, bytes->data, bytes->size, false, error));
     return lumi_key_save(key, path, hex, error);
 }
 
-/* Pieces end in a checksum: they are read back long after they were written. */
 static int piece_load(const struct compress_level *level, const char *kind, int number, uint8_t **data, size_t *size,
                       struct lumi_error *error)
 {

@@ -1,5 +1,6 @@
-/* Clusters of views and the views of the coarse level. */
+/* Clusters of views, the views of the coarse level, what a quality means. */
 #include "pipeline/compress/cluster.h"
+#include "pipeline/compress/level.h"
 #include "proto/base/memory.h"
 
 #include <setjmp.h>
@@ -89,6 +90,26 @@ static void views_in_one_place_and_single_views_do_no_harm(void **state)
     assert_int_equal(lumi_clusters_make(0, poses, 25, &clusters, NULL), LUMI_ERR_ARG);
 }
 
+static void quality_is_a_scale_from_the_coarsest_to_the_finest_quantizer(void **state)
+{
+    struct compress_quality quality, before;
+
+    (void)state;
+    compress_quality_init(&before, 0);
+    assert_int_equal(before.tile_quantizer, 63);
+    for (int value = 1; value <= 100; value++) {
+        compress_quality_init(&quality, value);
+        assert_true(quality.tile_quantizer <= before.tile_quantizer);
+        assert_true(quality.tile_quantizer >= before.tile_quantizer - 1); /* no step is left out */
+        assert_true(quality.reference_quantizer <= quality.tile_quantizer);
+        before = quality;
+    }
+    assert_int_equal(before.tile_quantizer, 0);
+    compress_quality_init(&quality, 10);
+    compress_quality_init(&before, 20);
+    assert_true(quality.tile_quantizer > before.tile_quantizer);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -96,6 +117,7 @@ int main(void)
         cmocka_unit_test(the_reference_image_is_near_its_cluster),
         cmocka_unit_test(the_coarse_level_has_one_view_of_nine),
         cmocka_unit_test(views_in_one_place_and_single_views_do_no_harm),
+        cmocka_unit_test(quality_is_a_scale_from_the_coarsest_to_the_finest_quantizer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
