@@ -6,7 +6,7 @@ endif()
 # lumi_house(NAME COMMAND...): a script of this folder as a CTest test; 77 means skipped.
 function(lumi_house NAME)
   add_test(NAME house_${NAME} COMMAND sh ${ARGN})
-  set_tests_properties(house_${NAME} PROPERTIES LABELS house SKIP_RETURN_CODE 77 TIMEOUT 300)
+  set_tests_properties(house_${NAME} PROPERTIES LABELS house SKIP_RETURN_CODE 77 TIMEOUT 600)
 endfunction()
 set(here ${CMAKE_CURRENT_SOURCE_DIR})
 
@@ -22,7 +22,7 @@ if(LUMI_CXX)
   add_test(NAME house_headers COMMAND_EXPAND_LISTS COMMAND sh ${here}/headers.sh ${PROJECT_SOURCE_DIR}
     ${CMAKE_C_COMPILER} ${LUMI_CXX} ${PROJECT_BINARY_DIR}/generated/installed_headers.txt
     "-I$<JOIN:$<REMOVE_DUPLICATES:${flags}>,;-I>")
-  set_tests_properties(house_headers PROPERTIES LABELS house TIMEOUT 300)
+  set_tests_properties(house_headers PROPERTIES LABELS house TIMEOUT 600)
 endif()
 
 # A small field, for the tests that want one: shot and processed by the program itself.
@@ -43,7 +43,7 @@ set(manual_work ${CMAKE_CURRENT_BINARY_DIR}/manual)
 file(MAKE_DIRECTORY ${manual_work})
 add_test(NAME house_manual COMMAND bash ${here}/manual.sh $<TARGET_FILE:lumi> ${PROJECT_BINARY_DIR}/manual
   WORKING_DIRECTORY ${manual_work})
-set_tests_properties(house_manual PROPERTIES LABELS house TIMEOUT 60)
+set_tests_properties(house_manual PROPERTIES LABELS house TIMEOUT 600)
 
 option(LUMI_SANITIZER_TESTS "tests house_asan and house_tsan: build the tree with sanitizers and run its tests" OFF)
 if(LUMI_SANITIZER_TESTS)
@@ -51,5 +51,5 @@ if(LUMI_SANITIZER_TESTS)
   lumi_house(asan ${here}/sanitize.sh ${PROJECT_SOURCE_DIR} asan -LE "long|slow")
   lumi_house(tsan ${here}/sanitize.sh ${PROJECT_SOURCE_DIR} tsan -L threads)
   # One at a time, and not beside other tests: each uses all cores.
-  set_tests_properties(house_asan house_tsan PROPERTIES RUN_SERIAL TRUE TIMEOUT 1500)
+  set_tests_properties(house_asan house_tsan PROPERTIES RUN_SERIAL TRUE TIMEOUT 2400)
 endif()
