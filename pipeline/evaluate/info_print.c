@@ -97,6 +97,12 @@ static void put_level(GString *text, const struct lumi_field_summary *summary, i
                                (double)summary->levels[level].triangles / (double)summary->levels[level].tiles);
 }
 
+/* Metres for people: what is under a micrometre is arithmetic. */
+static double metres(double value)
+{
+    return fabs(value) < 1e-6 ? 0 : value;
+}
+
 static void field_text(GString *text, const struct lumi_field_summary *summary, const char *path)
 {
     const struct lumi_field_info *info = &summary->info;
@@ -104,7 +110,8 @@ static void field_text(GString *text, const struct lumi_field_summary *summary, 
 
     g_string_append_printf(text, "%s: light field, version %u\n", path, info->version);
     g_string_append_printf(text, "surface   %s, radius %.4g m, about (%.4g, %.4g, %.4g)\n",
-                           surface_names[info->surface], info->radius, info->centre.x, info->centre.y, info->centre.z);
+                           surface_names[info->surface], info->radius, metres(info->centre.x), metres(info->centre.y),
+                           metres(info->centre.z));
     g_string_append_printf(text, "disks     %s, %s kernel\nquality   %d\n", shape_names[info->disk_shape],
                            kernel_names[info->kernel], info->quality);
     for (int i = 0; i < LUMI_LEVELS; i++)
