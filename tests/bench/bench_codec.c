@@ -1,12 +1,13 @@
 /* Bytes of the tile codec against WebP and a VP9 video of the same images, at equal PSNR (Overbeck et al. 2018, section
  * 8.2: over the three planes of YUV 4:2:0), and tiles decoded a second.
  *
- *   bench_codec COLUMNS RANGE FILE...
+ *   bench_codec [--half] COLUMNS RANGE FILE...
  *
  * The files are images of one size from cameras on a grid of COLUMNS columns, row by row: also the video's order, back
  * and forth. RANGE: of the shift search, pixels. All bytes of the level are counted: reference images, priming, side
  * information, tiles. WebP gets the planes as they are (method 6); so does the video (two seconds a key frame at most
- * are not asked for: one stream). Their bytes at our PSNR are interpolated between neighbouring qualities. */
+ * are not asked for: one stream). Their bytes at our PSNR are interpolated between neighbouring qualities.
+ * --half: images of half the width and height, means of four pixels. */
 #include "pipeline/compress/cluster.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
@@ -15,6 +16,7 @@
 #include "proto/lightfield/training.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -375,7 +377,32 @@ static void measure(struct bench *bench, int quantizer, const struct point *webp
     lumi_free(bench->training);
 }
 
-static void load(struct bench *bench, char **files)
+/* 8 bits; with `half` the mean of every four pixels. */
+static void read_image(const char *file, bool half, struct lumi_raster *image)
+{
+    struct lumi_error error;
+    struct lumi_raster raw, whole;
+
+    must(lumi_image_read(file, 3, &raw, NULL, &error), &error);
+    if (lumi_raster_convert(&raw, LUMI_U8, half ? &whole : image) != LUMI_OK)
+        exit(1);
+    lumi_raster_finish(&raw);
+    if (!half)
+        return;
+    if (lumi_raster_create(image, whole.width / 2, whole.height / 2, 3, LUMI_U8) != LUMI_OK)
+        exit(1);
+    for (int y = 0; y < image->height; y++) {
+        const uint8_t *a = lumi_row_u8(&whole, 2 * y), *b = lumi_row_u8(&whole, 2 * y + 1);
+        for (int x = 0; x < image->width; x++)
+            for (int c = 0; c < 3; c++) {
+                int at = 6 * x + c;
+                lumi_row_u8(image, y)[3 * x + c] = (uint8_t)((a[at] + a[at + 3] + b[at] + b[at + 3] + 2) / 4);
+            }
+    }
+    lumi_raster_finish(&whole);
+}
+
+static void load(struct bench *bench, char **files, bool half)
 {
     struct lumi_pose *poses = lumi_calloc((size_t)bench->count, sizeof *poses);
     struct lumi_error error;
@@ -386,7 +413,7 @@ static void load(struct bench *bench, char **files)
         exit(1);
     for (int i = 0; i < bench->count; i++) {
         struct lumi_raster raster;
-        must(lumi_image_read(files[i], 3, &raster, NULL, &error), &error);
+        read_image(files[i], half, &raster);
         must(lumi_yuv_from_raster(&raster, &bench->images[i]), &error);
         lumi_raster_finish(&raster);
         poses[i] = (struct lumi_pose){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {i % bench->columns, i / bench->columns, 0}};
@@ -414,8 +441,11 @@ int main(int argc, char **argv)
     struct point webps[POINTS], videos[POINTS];
     struct bench bench = {0};
 
+    bool half = argc > 1 && strcmp(argv[1], "--half") == 0;
+    argc -= half;
+    argv += half;
     if (argc < 4) {
-        fprintf(stderr, "usage: bench_codec COLUMNS RANGE FILE...\n");
+        fprintf(stderr, "usage: bench_codec [--half] COLUMNS RANGE FILE...\n");
         return 2;
     }
     bench.columns = atoi(argv[1]);
@@ -423,7 +453,7 @@ int main(int argc, char **argv)
     bench.count = argc - 3;
     if (bench.columns < 1)
         return 2;
-    load(&bench, argv + 3);
+    load(&bench, argv + 3, half);
     for (int i = 0; i < POINTS; i++) {
         webps[i] = webp(&bench, qualities[i]);
         videos[i] = video(&bench, quantizers[i]);
