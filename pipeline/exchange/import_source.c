@@ -254,31 +254,56 @@ static char *safe_name(const char *original, bool whole_path)
     return name;
 }
 
-/* Index of the first image whose name another has already, or −1. */
-static int name_all(struct lumi_exchange *exchange, bool whole_path)
+/* Index of the first image whose file another has already, however each spells it, or −1. */
+static int same_file(const struct lumi_exchange *exchange)
+{
+    g_autoptr(GHashTable) taken = g_hash_table_new_full(g_str_hash, g_str_equal, g_free, NULL);
+
+    for (guint i = 0; i < exchange->images->len; i++) {
+        const char *path = lumi_exchange_image(exchange, (int)i)->path;
+        if (!g_hash_table_add(taken, g_canonicalize_filename(path, NULL)))
+            return (int)i;
+    }
+    return -1;
+}
+
+#define NUMBERED_LENGTH (NAME_MAX_LENGTH - 5) /* leaves room for the number of any image */
+
+/* Whether all got different names. With `number`, later ones of a name get -2, -3 and so on behind it. */
+static bool name_all(struct lumi_exchange *exchange, bool whole_path, bool number)
 {
     g_autoptr(GHashTable) taken = g_hash_table_new(g_str_hash, g_str_equal);
+    g_autoptr(GHashTable) counts = g_hash_table_new_full(g_str_hash, g_str_equal, g_free, NULL);
 
     for (guint i = 0; i < exchange->images->len; i++) {
         struct lumi_exchange_image *image = lumi_exchange_image(exchange, (int)i);
         g_free(image->name);
         image->name = safe_name(image->original, whole_path);
-        if (!g_hash_table_add(taken, image->name)) {
-            g_hash_table_remove_all(taken);
-            return (int)i;
+        if (!number && !g_hash_table_add(taken, image->name))
+            return false; /* they are named anew */
+        if (!number)
+            continue;
+        char *plain = g_strdup(image->name);
+        int count = MAX(1, GPOINTER_TO_INT(g_hash_table_lookup(counts, plain)));
+        while (g_hash_table_contains(taken, image->name)) {
+            g_free(image->name);
+            image->name = g_strdup_printf("%.*s-%d", NUMBERED_LENGTH, plain, ++count);
         }
+        g_hash_table_add(taken, image->name);
+        g_hash_table_insert(counts, plain, GINT_TO_POINTER(count));
     }
-    return -1;
+    return true;
 }
 
 int exchange_name_images(struct lumi_exchange *exchange, const char *source, struct lumi_error *error)
 {
-    int twice = name_all(exchange, false);
+    int twice = same_file(exchange);
 
     if (twice >= 0)
-        twice = name_all(exchange, true);
-    if (twice < 0)
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: two images of one name: '%s'", source,
-                     lumi_exchange_image(exchange, twice)->original);
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: two images of one name: '%s'", source,
+                         lumi_exchange_image(exchange, twice)->original);
+    /* Names that differ only in what a safe name cannot hold ("ä", "ö") are told apart by numbers. */
+    if (!name_all(exchange, false, false) && !name_all(exchange, true, false))
+        name_all(exchange, true, true);
+    return LUMI_OK;
 }

@@ -127,7 +127,7 @@ static bool take_key(struct scan *scan)
     return take(scan, ':');
 }
 
-bool lumi_json_check(const char *text, size_t size)
+const char *lumi_json_fault(const char *text, size_t size)
 {
     struct scan scan = {text, text + size};
     char open[MAX_DEPTH];
@@ -139,32 +139,37 @@ bool lumi_json_check(const char *text, size_t size)
         char c = scan.at < scan.end ? *scan.at : '\0';
         if (c == '[' || c == '{') {
             if (depth == MAX_DEPTH)
-                return false;
+                return scan.at;
             open[depth++] = c == '[' ? ']' : '}';
             scan.at++;
             skip_space(&scan);
             if (!take(&scan, open[depth - 1])) {
                 if (c == '{' && !take_key(&scan))
-                    return false;
+                    return scan.at;
                 continue;
             }
             depth--;
         } else if (!take_scalar(&scan)) {
-            return false;
+            return scan.at;
         }
         /* Behind a value: what it is part of goes on or ends. */
         for (;;) {
             skip_space(&scan);
             if (depth == 0)
-                return scan.at == scan.end;
+                return scan.at == scan.end ? NULL : scan.at;
             if (take(&scan, ',')) {
                 if (open[depth - 1] == '}' && !take_key(&scan))
-                    return false;
+                    return scan.at;
                 break;
             }
             if (!take(&scan, open[depth - 1]))
-                return false;
+                return scan.at;
             depth--;
         }
     }
+}
+
+bool lumi_json_check(const char *text, size_t size)
+{
+    return lumi_json_fault(text, size) == NULL;
 }

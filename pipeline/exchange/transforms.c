@@ -238,6 +238,25 @@ static int read_root(JsonNode *root, const char *name, struct lumi_exchange *exc
     return LUMI_OK;
 }
 
+/* Where the JSON is broken: numbers like NaN, which some programs write, are a common cause. */
+static int fail_json(const char *text, const char *fault, const char *end, const char *name, struct lumi_error *error)
+{
+    int line = 1, shown = 0;
+    const char *start = text;
+
+    for (const char *c = text; c < fault; c++)
+        if (*c == '\n') {
+            line++;
+            start = c + 1;
+        }
+    while (shown < 20 && fault + shown < end && g_ascii_isgraph(fault[shown]) && !strchr(",]}", fault[shown]))
+        shown++;
+    if (fault == end)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not well-formed JSON: it ends too early (line %d)", name, line);
+    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not well-formed JSON: line %d, column %d: '%.*s'", name, line,
+                     (int)(fault - start) + 1, MAX(shown, 1), fault);
+}
+
 int lumi_exchange_parse_transforms(const char *text, size_t size, const char *name, struct lumi_exchange *exchange,
                                    struct lumi_error *error)
 {
@@ -248,8 +267,13 @@ int lumi_exchange_parse_transforms(const char *text, size_t size, const char *na
         text += 3;
         size -= 3;
     }
-    if (!lumi_json_check(text, size) || !g_utf8_validate(text, (gssize)size, NULL) || size > G_MAXINT)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not well-formed JSON", name);
+    if (size > G_MAXINT)
+        return lumi_fail(error, LUMI_ERR_LIMIT, "%s: has more than %d bytes", name, G_MAXINT);
+    const char *fault = lumi_json_fault(text, size);
+    if (fault)
+        return fail_json(text, fault, text + size, name, error);
+    if (!g_utf8_validate(text, (gssize)size, NULL))
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not UTF-8", name);
     if (!json_parser_load_from_data(parser, text, (gssize)size, &parse_error))
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: %s", name, parse_error->message);
     return read_root(json_parser_get_root(parser), name, exchange, error);

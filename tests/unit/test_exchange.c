@@ -139,6 +139,22 @@ static void nested_json_is_refused_before_it_is_parsed(void **state)
     assert_false(lumi_json_check("\"a", 2));
 }
 
+static void broken_json_is_located(void **state)
+{
+    static const char *const cases[][2] = {
+        {"{\"frames\":\n [1, NaN, 2]}", "t.json: not well-formed JSON: line 2, column 6: 'NaN'"},
+        {"{\"frames\":\n [1, 2", "t.json: not well-formed JSON: it ends too early (line 2)"},
+        {"", "t.json: not well-formed JSON: it ends too early (line 1)"},
+        {"{\"\xff\": 1}", "t.json: not UTF-8"},
+    };
+
+    (void)state;
+    for (size_t i = 0; i < G_N_ELEMENTS(cases); i++) {
+        assert_int_equal(parse(cases[i][0]), LUMI_ERR_FORMAT);
+        assert_string_equal(error.text, cases[i][1]);
+    }
+}
+
 static bool json_is_good(const char *text)
 {
     return lumi_json_check(text, strlen(text));
@@ -332,6 +348,7 @@ int main(void)
         cmocka_unit_test(a_frame_may_have_a_camera_of_its_own),
         cmocka_unit_test(bad_transforms_are_refused_with_one_line),
         cmocka_unit_test(nested_json_is_refused_before_it_is_parsed),
+        cmocka_unit_test(broken_json_is_located),
         cmocka_unit_test(half_of_a_surrogate_pair_is_no_text),
         cmocka_unit_test(transforms_are_written_so_that_reading_gives_the_same_numbers),
         cmocka_unit_test(colmap_poses_are_turned_round),

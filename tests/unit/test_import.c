@@ -324,6 +324,39 @@ static void two_images_of_one_name_are_named(void **state)
     write_grid();
     write_text("two.json", text);
     expect("two.json", LUMI_ERR_FORMAT, "two.json", "two images of one name: 'images/p0.png'");
+    /* The same file under another spelling is the same image. */
+    char *second = strstr(strstr(text, "images/p0.png") + 1, "images/p0.png");
+    memcpy(second, "images//p0   ", 13);
+    memmove(second + 10, second + 13, strlen(second + 13) + 1);
+    write_text("two.json", text);
+    expect("two.json", LUMI_ERR_FORMAT, "two.json", "two images of one name: 'images//p0'");
+}
+
+static void names_that_differ_only_in_other_letters_are_told_apart(void **state)
+{
+    GString *text = g_string_new("{\"w\":32,\"h\":24,\"fl_x\":30,\"frames\":[");
+    int count;
+
+    (void)state;
+    static const char *const files[] = {"a b/\xc3\xa4.png", "a b/\xc3\xb6.png", "a b/\xc3\xbc.png"};
+    for (int i = 0; i < 3; i++) {
+        write_picture(files[i], 32, 24);
+        g_string_append_printf(
+            text, "%s{\"file_path\":\"%s\",\"transform_matrix\":[[1,0,0,%d],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}",
+            i ? "," : "", files[i], i);
+    }
+    g_string_append(text, "]}");
+    write_text("t.json", text->str);
+    g_string_free(text, TRUE);
+    if (import("t.json") != LUMI_OK)
+        fail_msg("%s", error.text);
+    struct lumi_capture_frame *frames = frames_of_capture(&count);
+    assert_int_equal(count, 3);
+    for (int i = 0; i < 3; i++)
+        assert_string_equal(frames[i].original, files[i]);
+    assert_string_equal(frames[1].name, "a_b___-2");
+    assert_string_equal(frames[2].name, "a_b___-3");
+    lumi_free(frames);
 }
 
 static void files_of_one_name_in_two_folders_are_told_apart(void **state)
@@ -377,6 +410,7 @@ int main(void)
         TEST(an_image_of_another_size_is_named),
         TEST(a_damaged_image_is_named),
         TEST(two_images_of_one_name_are_named),
+        TEST(names_that_differ_only_in_other_letters_are_told_apart),
         TEST(files_of_one_name_in_two_folders_are_told_apart),
         TEST(what_is_no_source_is_said_to_be_none),
         TEST(an_existing_capture_is_not_overwritten),
