@@ -9,6 +9,7 @@
 #include <errno.h>
 #include <glib.h>
 #include <glib/gstdio.h>
+#include <unistd.h>
 
 void sim_output_init(struct sim_output *output)
 {
@@ -128,27 +129,34 @@ static int make_folder(const char *path, struct lumi_error *error)
     return lumi_fail_errno(error, path, "cannot make the folder");
 }
 
-int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,
-                    const char *dir, struct lumi_error *error)
-{
-    g_autofree char *images = g_build_filename(dir, "images", NULL), *depths = g_build_filename(dir, "depth", NULL);
-    g_autofree char *poses = g_build_filename(dir, "transforms.json", NULL);
-    g_autoptr(GString) json = g_string_new("{\"frames\": [\n");
+struct places {
+    char *images, *depths;
+};
 
-    if (!output->overwrite && g_file_test(poses, G_FILE_TEST_EXISTS))
-        return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", poses);
-    LUMI_TRY(sim_sensor_check(&output->sensor, error));
-    LUMI_TRY(make_folder(images, error));
-    if (output->depth)
-        LUMI_TRY(make_folder(depths, error));
+static char *view_name(const struct sim_rig *views, int index)
+{
+    const struct sim_view *view = &views->views[index];
+
+    return views->rows > 1 ? g_strdup_printf("r%02dc%02d", view->row, view->column) : g_strdup_printf("v%04d", index);
+}
+
+static void view_paths(const struct places *places, const struct sim_output *output, const char *name, char **image,
+                       char **depth)
+{
+    *image = g_strconcat(places->images, "/", name, sim_format_extension(output->format), NULL);
+    *depth = output->depth ? g_strconcat(places->depths, "/", name, ".exr", NULL) : NULL;
+}
+
+static int write_views(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,
+                       const struct places *places, int *begun, GString *json, struct lumi_error *error)
+{
     for (int i = 0; i < views->count; i++) {
         const struct sim_view *view = &views->views[i];
-        g_autofree char *name =
-            views->rows > 1 ? g_strdup_printf("r%02dc%02d", view->row, view->column) : g_strdup_printf("v%04d", i);
-        g_autofree char *path = g_strconcat(images, "/", name, sim_format_extension(output->format), NULL);
-        g_autofree char *depth = output->depth ? g_strconcat(depths, "/", name, ".exr", NULL) : NULL;
+        g_autofree char *name = view_name(views, i), *path = NULL, *depth = NULL;
         uint8_t *data = NULL;
         size_t size = 0;
+        view_paths(places, output, name, &path, &depth);
+        *begun = i + 1;
         int code = sim_view_encode(scene, view, i, output, depth, &data, &size, error);
         if (code == LUMI_OK)
             code = lumi_file_write(path, data, size, false, error);
@@ -159,6 +167,45 @@ int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, 
         if (output->progress)
             output->progress(output->context, i + 1, views->count);
     }
+    return LUMI_OK;
+}
+
+/* Half a set of views is no truth. Folders that hold something else stay. */
+static void remove_views(const struct sim_rig *views, const struct sim_output *output, const struct places *places,
+                         int begun, const char *dir)
+{
+    for (int i = 0; i < begun; i++) {
+        g_autofree char *name = view_name(views, i), *path = NULL, *depth = NULL;
+        view_paths(places, output, name, &path, &depth);
+        unlink(path);
+        if (depth)
+            unlink(depth);
+    }
+    rmdir(places->images);
+    rmdir(places->depths);
+    rmdir(dir);
+}
+
+int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,
+                    const char *dir, struct lumi_error *error)
+{
+    g_autofree char *images = g_build_filename(dir, "images", NULL), *depths = g_build_filename(dir, "depth", NULL);
+    g_autofree char *poses = g_build_filename(dir, "transforms.json", NULL);
+    g_autoptr(GString) json = g_string_new("{\"frames\": [\n");
+    struct places places = {images, depths};
+    int begun = 0, code;
+
+    if (!output->overwrite && g_file_test(poses, G_FILE_TEST_EXISTS))
+        return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", poses);
+    LUMI_TRY(sim_sensor_check(&output->sensor, error));
+    LUMI_TRY(make_folder(images, error));
+    if (output->depth)
+        LUMI_GOTO(code, failed, make_folder(depths, error));
+    LUMI_GOTO(code, failed, write_views(scene, views, output, &places, &begun, json, error));
     g_string_append(json, "]}\n");
-    return lumi_file_write(poses, json->str, json->len, false, error);
+    LUMI_GOTO(code, failed, lumi_file_write(poses, json->str, json->len, false, error));
+    return LUMI_OK;
+failed:
+    remove_views(views, output, &places, begun, dir);
+    return code;
 }
