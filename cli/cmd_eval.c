@@ -54,6 +54,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     (void)argc;
     if (!!truth_file + !!codec != 1)
         return lumi_fail(error, LUMI_ERR_ARG, "one of --truth FILE and --codec CAPTURE is wanted");
+    LUMI_TRY(cli_check_threads(shared.threads, error));
     if (codec)
         return run_codec(argv[0], error);
     LUMI_TRY(cli_render_options_apply(&shared, &o.render, error));

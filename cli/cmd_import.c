@@ -44,6 +44,12 @@ static int read_every(struct lumi_import_options *import, struct lumi_error *err
     return LUMI_OK;
 }
 
+/* 0 stands for: not given. */
+static bool is_length(double value)
+{
+    return value >= 0 && value <= 1e9;
+}
+
 static int run_import(int argc, char **argv, struct lumi_error *error)
 {
     g_autoptr(GDateTime) now = g_date_time_new_now_utc();
@@ -54,10 +60,11 @@ static int run_import(int argc, char **argv, struct lumi_error *error)
     lumi_import_options_init(&import);
     if (!output)
         return lumi_fail(error, LUMI_ERR_ARG, "where to? -o CAPTURE is needed");
-    if (limit < 0 || unit < 0 || focal < 0 || plane < 0 || fov < 0 || fov >= 180)
+    if (limit < 0 || !is_length(unit) || !is_length(focal) || !is_length(plane) || !(fov >= 0 && fov < 180))
         return lumi_fail(error, LUMI_ERR_ARG, "--limit, --unit, --focal, --plane and --fov want positive numbers");
     if (flip && strspn(flip, "xy") != strlen(flip))
         return lumi_fail(error, LUMI_ERR_ARG, "--flip %s: x, y or xy wanted", flip);
+    LUMI_TRY(cli_check_threads(threads, error));
     LUMI_TRY(read_every(&import, error));
     import.images = images;
     import.limit = limit;

@@ -45,6 +45,7 @@ static int parse(struct sim_rig_options *rig, struct sim_output *output, struct 
 
     if (!out)
         return lumi_fail(error, LUMI_ERR_ARG, "-o CAPTURE is missing");
+    LUMI_TRY(cli_check_threads(threads, error));
     if (size_text)
         LUMI_TRY(cli_parse_ints("--size", size_text, 'x', 2, size, error));
     if (lens_text)

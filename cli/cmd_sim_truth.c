@@ -125,6 +125,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
         return lumi_fail(error, LUMI_ERR_ARG, "-o DIR is missing");
     if (!rig_text)
         rig_text = (char *)"arc16";
+    LUMI_TRY(cli_check_threads(threads, error));
     sim_output_init(&output);
     if (format_text)
         LUMI_TRY(cli_parse_choice("--format", format_text, formats, &format, error));

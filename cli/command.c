@@ -59,6 +59,13 @@ int cli_parse_ints(const char *option, const char *text, char separator, int cou
     return LUMI_OK;
 }
 
+int cli_check_threads(int threads, struct lumi_error *error)
+{
+    if (threads < 0)
+        return lumi_fail(error, LUMI_ERR_ARG, "--threads %d: a number from 1 wanted, or 0 for all", threads);
+    return LUMI_OK;
+}
+
 int cli_parse_choice(const char *option, const char *text, const char *const *names, int *choice,
                      struct lumi_error *error)
 {

@@ -33,6 +33,8 @@ int cli_parse_ints(const char *option, const char *text, char separator, int cou
                    struct lumi_error *error);
 int cli_parse_doubles(const char *option, const char *text, char separator, int count, double *values,
                       struct lumi_error *error);
+/* --threads: 0 (all) or a number. */
+int cli_check_threads(int threads, struct lumi_error *error);
 /* Index of `text` among `names` (NULL-terminated); LUMI_ERR_ARG lists them. */
 int cli_parse_choice(const char *option, const char *text, const char *const *names, int *choice,
                      struct lumi_error *error);

@@ -2,6 +2,7 @@
 #include "cli/command.h"
 
 #include <locale.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -34,9 +35,19 @@ static const struct cli_command *find(int argc, char **argv, int *words)
     return best;
 }
 
-static int usage_error(const char *text)
+/* "sim" alone is no command, but the beginning of some: those are named. */
+static int usage_error(const char *word)
 {
-    fprintf(stderr, "lumi: %s (see 'lumi help')\n", text);
+    g_autoptr(GString) longer = g_string_new(NULL);
+    g_autofree char *start = g_strconcat(word, " ", NULL);
+
+    for (int i = 0; cli_commands[i]; i++)
+        if (g_str_has_prefix(cli_commands[i]->name, start))
+            g_string_append_printf(longer, "%s '%s'", longer->len ? "," : "", cli_commands[i]->name);
+    if (longer->len)
+        fprintf(stderr, "lumi: '%s' what? There are%s\n", word, longer->str);
+    else
+        fprintf(stderr, "lumi: no command '%s' (see 'lumi help')\n", word);
     return 2;
 }
 
@@ -79,6 +90,7 @@ int main(int argc, char **argv)
     int words;
 
     setlocale(LC_CTYPE, "");
+    signal(SIGXFSZ, SIG_IGN); /* a file over the limit (ulimit -f) is a write that fails, to be cleaned up after */
     if (argc == 2 && !strcmp(argv[1], "--version")) {
         puts("lumi " LUMI_VERSION);
         return 0;
@@ -89,9 +101,7 @@ int main(int argc, char **argv)
         return command ? run(command, 0, NULL) : 2;
     }
     const struct cli_command *command = find(argc, argv, &words);
-    if (!command) {
-        g_autofree char *text = g_strdup_printf("no command '%s'", argv[1]);
-        return usage_error(text);
-    }
+    if (!command)
+        return usage_error(argv[1]);
     return run(command, argc - 1 - words, argv + 1 + words);
 }

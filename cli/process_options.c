@@ -3,7 +3,17 @@
 
 #include "proto/base/geometry.h"
 
-struct process_options process_options = {.quality = -1};
+#define NOT_GIVEN (-1000000)
+
+struct process_options process_options = {.pixels_per_degree = NOT_GIVEN,
+                                          .near_m = NOT_GIVEN,
+                                          .far_m = NOT_GIVEN,
+                                          .gp = NOT_GIVEN,
+                                          .disk_scale = NOT_GIVEN,
+                                          .neighbours = NOT_GIVEN,
+                                          .quality = NOT_GIVEN,
+                                          .cluster = NOT_GIVEN,
+                                          .target_bytes = NOT_GIVEN};
 
 static int check_range(const char *name, double value, double least, double most, struct lumi_error *error)
 {
@@ -34,38 +44,38 @@ static int read_names(struct lumi_parameters *parameters, struct lumi_error *err
     return LUMI_OK;
 }
 
-/* Numbers that were not given are 0 and leave the defaults. */
+/* Numbers that were not given leave the defaults. */
 static int read_numbers(struct lumi_parameters *parameters, struct lumi_error *error)
 {
     const struct process_options *o = &process_options;
 
-    if (o->pixels_per_degree != 0) {
+    if (o->pixels_per_degree != NOT_GIVEN) {
         LUMI_TRY(check_range("--pixels-per-degree", o->pixels_per_degree, 0.1, 1000, error));
         parameters->pixels_per_degree = o->pixels_per_degree;
     }
-    if (o->near_m != 0) {
+    if (o->near_m != NOT_GIVEN) {
         LUMI_TRY(check_range("--near", o->near_m, 1e-4, 1e6, error));
         parameters->near_m = o->near_m;
     }
-    if (o->far_m != 0) {
+    if (o->far_m != NOT_GIVEN) {
         LUMI_TRY(check_range("--far", o->far_m, 1e-4, 1e9, error));
         parameters->far_m = o->far_m;
     }
     if (o->near_m > 0 && o->far_m > 0 && o->near_m >= o->far_m)
         return lumi_fail(error, LUMI_ERR_ARG, "--near %g is not before --far %g", o->near_m, o->far_m);
-    if (o->neighbours != 0) {
+    if (o->neighbours != NOT_GIVEN) {
         LUMI_TRY(check_range("--neighbours", o->neighbours, 1, 8, error));
         parameters->depth_neighbours = o->neighbours;
     }
-    if (o->gp != 0) {
+    if (o->gp != NOT_GIVEN) {
         LUMI_TRY(check_range("--gp", o->gp, 1, 1000, error));
         parameters->geometry_precision = o->gp;
     }
-    if (o->disk_scale != 0) {
+    if (o->disk_scale != NOT_GIVEN) {
         LUMI_TRY(check_range("--disk-scale", o->disk_scale, 0.1, 10, error));
         parameters->disk_scale = o->disk_scale;
     }
-    if (o->cluster != 0) {
+    if (o->cluster != NOT_GIVEN) {
         LUMI_TRY(check_range("--cluster", o->cluster, 1, 1000, error));
         parameters->cluster_size = o->cluster;
     }
@@ -77,14 +87,15 @@ int process_options_read(struct lumi_parameters *parameters, struct lumi_error *
     const struct process_options *o = &process_options;
 
     lumi_run_defaults(parameters);
+    LUMI_TRY(cli_check_threads(o->threads, error));
     LUMI_TRY(read_names(parameters, error));
     LUMI_TRY(read_numbers(parameters, error));
-    if (o->quality >= 0) {
+    if (o->quality != NOT_GIVEN) {
         LUMI_TRY(check_range("--quality", o->quality, 0, 100, error));
         parameters->quality = o->quality;
     }
-    if (o->target_bytes != 0) {
-        if (o->target_bytes < 1000 || o->quality >= 0)
+    if (o->target_bytes != NOT_GIVEN) {
+        if (o->target_bytes < 1000 || o->quality != NOT_GIVEN)
             return lumi_fail(error, LUMI_ERR_ARG, "--target-bytes: at least 1000, and not together with --quality");
         parameters->target_bytes = o->target_bytes;
     }

@@ -22,6 +22,7 @@ int cli_render_options_apply(const struct cli_render_options *o, struct lumi_ren
 
     lumi_render_options_default(render);
     filter = (int)render->disks.filter;
+    LUMI_TRY(cli_check_threads(o->threads, error));
     LUMI_TRY(choose("--method", o->method, methods, &method, error));
     LUMI_TRY(choose("--level", o->level, levels, &level, error));
     LUMI_TRY(choose("--depth-test", o->depth_test, tests, &test, error));
