@@ -58,7 +58,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     if (codec)
         return run_codec(argv[0], error);
     LUMI_TRY(cli_render_options_apply(&shared, &o.render, error));
-    LUMI_TRY(lumi_truth_read(truth_file, frames_regex, &truth, error));
+    LUMI_TRY(lumi_truth_read(truth_file, frames_regex, false, &truth, error));
     int code = lumi_evaluate(argv[0], &truth, &o, &evaluation, error);
     if (code == LUMI_OK) {
         cli_progress_end();

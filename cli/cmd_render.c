@@ -70,7 +70,7 @@ static int shots_of_file(GArray *shots, struct lumi_error *error)
 
     if (!poses_file)
         return LUMI_OK;
-    LUMI_TRY(lumi_truth_read(poses_file, frames_regex, &truth, error));
+    LUMI_TRY(lumi_truth_read(poses_file, frames_regex, true, &truth, error));
     for (int i = 0; i < truth.count; i++) {
         struct lumi_shot shot = {g_strdup(truth.items[i].name), truth.items[i].lens, truth.items[i].pose};
         g_array_append_val(shots, shot);

@@ -22,8 +22,9 @@ struct lumi_truth_set {
 };
 
 /* Reads the poses and lenses of a transforms.json; pictures are read when they are needed. `frames` (may be NULL) is a
- * regular expression that the names begin with; others are left out. */
-int lumi_truth_read(const char *path, const char *frames, struct lumi_truth_set *truth, struct lumi_error *error);
+ * regular expression that the names begin with; others are left out. `poses_only`: the pictures need not be there. */
+int lumi_truth_read(const char *path, const char *frames, bool poses_only, struct lumi_truth_set *truth,
+                    struct lumi_error *error);
 void lumi_truth_finish(struct lumi_truth_set *truth);
 
 struct lumi_evaluate_options {

@@ -36,7 +36,8 @@ static int add_frame(const struct lumi_exchange *list, const struct lumi_exchang
     return LUMI_OK;
 }
 
-int lumi_truth_read(const char *path, const char *frames, struct lumi_truth_set *truth, struct lumi_error *error)
+int lumi_truth_read(const char *path, const char *frames, bool poses_only, struct lumi_truth_set *truth,
+                    struct lumi_error *error)
 {
     struct lumi_import_options options;
     struct lumi_exchange list;
@@ -52,6 +53,7 @@ int lumi_truth_read(const char *path, const char *frames, struct lumi_truth_set 
     }
     lumi_import_options_init(&options);
     options.trust = true;
+    options.poses_only = poses_only;
     lumi_exchange_init(&list);
     LUMI_GOTO(code, out, lumi_import_list(path, &options, &list, error));
     truth->items = g_new0(struct lumi_truth, list.images->len);

@@ -119,6 +119,7 @@ struct lumi_import_options {
     double plane;                /* Stanford names: metres to the plane the pictures are aligned on; 0: infinity */
     bool flip_x, flip_y;         /* Stanford names: positions count to the left, upwards */
     bool trust;                  /* do not decode the pictures to see whether they are whole */
+    bool poses_only;             /* the pictures need not be there (unless only they tell their size) */
     int threads;                 /* as lumi_parallel_for */
     const char *date;            /* YYYY-MM-DD, for the bag; may be NULL */
     void (*progress)(const char *what, long done, long total); /* may be NULL */

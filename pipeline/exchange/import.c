@@ -145,6 +145,8 @@ int lumi_import_list(const char *source, const struct lumi_import_options *optio
             image->numbers = LUMI_EXCHANGE_NONE;
         }
     }
+    if (options->poses_only)
+        return LUMI_OK;
     struct check check = {.exchange = exchange,
                           .options = options,
                           .source = source,

@@ -112,6 +112,10 @@ at_least "$(number psnr_yuv_mean codec.json)" 40 "what compression left"
 "$lumi" render gp.lumi -o gp --poses truth/transforms.json -j 1 >/dev/null || fail "render with gp 1"
 "$lumi" render one.lumi -o pictures1 --poses truth/transforms.json -j 1 >/dev/null || fail "render with one thread"
 same pictures/v0000.png pictures1/v0000.png "threads of the renderer"
+mkdir -p poses && cp truth/transforms.json poses/ # poses alone, no pictures beside them
+"$lumi" render one.lumi -o pictures2 --poses poses/transforms.json >/dev/null || fail "render without the truth's pictures"
+same pictures/v0000.png pictures2/v0000.png "pictures that need not be there"
+expect 3 "the image is missing" "$lumi" eval one.lumi --truth poses/transforms.json
 cmp -s pictures/v0000.png gp/v0000.png && fail "geometry makes no difference"
 "$lumi" render one.lumi -o stereo.png --stereo -p 0,0,0,90,0 -s 64x48 --fov 30 >/dev/null || fail "stereo"
 [ "$(png_size stereo.png)" = 128x48 ] || fail "the stereo pair is $(png_size stereo.png)"
