@@ -21,6 +21,9 @@ expect() { # STATUS PART COMMAND...: exit status and a part of what is printed
 
 "$make" "$scratch/a" || fail "no capture"
 "$here/bagit_check.sh" "$scratch/a" || fail "the sealed capture is no BagIt bag"
+if python3 -c "import bagit" 2>/dev/null; then
+    python3 -c "import bagit, sys; bagit.Bag(sys.argv[1]).validate()" "$scratch/a" || fail "bagit.py finds no valid bag"
+fi
 expect 0 "a: whole, sealed: 16 files" "$lumi" verify "$scratch/a"
 expect 0 '"whole":true' "$lumi" verify --json "$scratch/a"
 cp -r "$scratch/a" "$scratch/b"
