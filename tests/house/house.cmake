@@ -15,13 +15,14 @@ lumi_house(layers_seen ${here}/layers_test.sh ${here})
 lumi_house(text ${here}/text.sh ${PROJECT_SOURCE_DIR} ${here}/bounds.txt)
 lumi_house(format ${here}/format.sh ${PROJECT_SOURCE_DIR})
 
-# Every header alone, with the include folders of the libraries that the program uses.
+# Every header alone, with the include folders of the libraries that the program uses, and which Embree it is.
 set(flags "$<TARGET_PROPERTY:lumi,INCLUDE_DIRECTORIES>")
+set(defined "$<TARGET_PROPERTY:lumi_sim,COMPILE_DEFINITIONS>")
 find_program(LUMI_CXX NAMES c++ g++ clang++)
 if(LUMI_CXX)
   add_test(NAME house_headers COMMAND_EXPAND_LISTS COMMAND sh ${here}/headers.sh ${PROJECT_SOURCE_DIR}
     ${CMAKE_C_COMPILER} ${LUMI_CXX} ${PROJECT_BINARY_DIR}/generated/installed_headers.txt
-    "-I$<JOIN:$<REMOVE_DUPLICATES:${flags}>,;-I>")
+    "-I$<JOIN:$<REMOVE_DUPLICATES:${flags}>,;-I>" "-D$<JOIN:$<REMOVE_DUPLICATES:${defined}>,;-D>")
   set_tests_properties(house_headers PROPERTIES LABELS house TIMEOUT 600)
 endif()
 

@@ -20,7 +20,7 @@ export PKG_CONFIG_PATH="$libdir/pkgconfig"
 "$cc" -std=c17 -Wall -Wextra -Werror "$source/examples/view.c" -o "$top/view" \
     $(pkg-config --define-variable=prefix="$prefix" --cflags --libs lumi)
 cp -r "$source/examples" "$top/examples"
-"$cmake" -S "$top/examples" -B "$top/build" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$prefix" >"$top/log" &&
+"$cmake" -G Ninja -S "$top/examples" -B "$top/build" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$prefix" >"$top/log" &&
     "$cmake" --build "$top/build" >>"$top/log" || { cat "$top/log"; exit 1; }
 
 for program in "$top/view" "$top/build/view" "$top/build/view_static"; do
