@@ -231,7 +231,7 @@ static int make(struct lumi_run *run, void *data, int index, int thread, const c
 const struct lumi_stage lumi_stage_match = {
     .name = "match",
     .title = "matching",
-    .version = 1,
+    .version = 2,
     .extension = ".exr",
     .key = match_key,
     .begin = match_begin,

@@ -6,8 +6,13 @@
 #include <string.h>
 
 #define NEAREST_SEARCHED 0.25 /* metres, where nobody says how near things are */
+/* But poses need not be in metres: in terms of the longest baseline, that is kept between these. */
+#define LEAST_BASELINES 0.3
+#define MOST_BASELINES 3.0
 
-enum { COARSE = 4 }; /* the range of depths is found at a quarter of the size */
+enum { COARSE = 4 };   /* the range of depths is found at a quarter of the size */
+enum { NARROWED = 8 }; /* a range that shrinks so much was searched in steps that are too wide */
+enum { ROUNDS_MAX = 4 };
 
 struct plane_range {
     double first, step; /* w of plane 0, and between planes */
@@ -90,9 +95,21 @@ done:
     return code;
 }
 
+/* Inverse depth of the nearest surface that is looked for. */
+static double nearest_searched(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours)
+{
+    double longest = 0;
+
+    for (int n = 0; n < count; n++)
+        longest = fmax(longest, lumi_length(lumi_sub(neighbours[n].pose.t, view->pose.t)));
+    if (!(longest > 0))
+        return 1 / NEAREST_SEARCHED;
+    return 1 / fmin(fmax(NEAREST_SEARCHED, LEAST_BASELINES * longest), MOST_BASELINES * longest);
+}
+
 /* Narrows [low, high] to the depths that a search at low resolution finds, less one in two thousand at either end. */
-static int find_range(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours, int threads,
-                      double *low, double *high)
+static int narrow_range(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours,
+                        int threads, double *low, double *high)
 {
     const int width = view->grid->width / COARSE, height = view->grid->height / COARSE;
     const long pixels = (long)width * height, few = pixels / 2000 + 1;
@@ -120,6 +137,18 @@ static int find_range(const struct lumi_mvs_view *view, int count, const struct 
     return code;
 }
 
+static int find_range(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours, int threads,
+                      double *low, double *high)
+{
+    double before = INFINITY;
+
+    for (int i = 0; i < ROUNDS_MAX && *high - *low < before / NARROWED; i++) {
+        before = *high - *low;
+        LUMI_TRY(narrow_range(view, count, neighbours, threads, low, high));
+    }
+    return LUMI_OK;
+}
+
 int mvs_check(const struct lumi_mvs_view *view, bool depth, struct lumi_error *error)
 {
     if (!lumi_grid_valid(view->grid) || !lumi_pose_valid(&view->pose, 1e-3))
@@ -138,7 +167,8 @@ int lumi_mvs_match(const struct lumi_mvs_view *view, int count, const struct lum
                    struct lumi_error *error)
 {
     double low = settings->far_m > 0 ? 1 / settings->far_m : 0;
-    double high = settings->near_m > 0 ? 1 / settings->near_m : fmax(1 / NEAREST_SEARCHED, 2 * low);
+    double high =
+        settings->near_m > 0 ? 1 / settings->near_m : fmax(nearest_searched(view, count, neighbours), 2 * low);
     float *planes = NULL;
     int code;
 

@@ -218,6 +218,31 @@ static void depth_of_two_planes_is_found_by_turned_equiangular_cameras(void **st
     check_scene(&scene);
 }
 
+/* Poses from structure from motion are in no unit at all. */
+static void depth_is_found_whatever_the_unit_of_the_poses(void **state)
+{
+    static const double units[] = {0.01, 1, 1000}; /* of the poses, to the metre */
+    struct scene scene;
+
+    (void)state;
+    build_planar(&scene);
+    for (int k = 0; k < 3; k++) {
+        struct lumi_raster *map = &scene.maps[CENTRE];
+        struct lumi_pose truth[VIEWS];
+        memcpy(truth, scene.poses, sizeof truth);
+        for (int i = 0; i < VIEWS; i++)
+            scene.views[i].pose.t = scene.poses[i].t = lumi_scale(truth[i].t, units[k]);
+        match(&scene, CENTRE, 0);
+        memcpy(scene.poses, truth, sizeof truth);
+        for (int y = 0; y < map->height; y++)
+            for (int x = 0; x < map->width; x++)
+                lumi_row_f32(map, y)[x] *= (float)units[k];
+        assert_true(share_right(&scene, CENTRE, map, 0.02) > 0.95);
+        lumi_raster_finish(map);
+    }
+    finish(&scene);
+}
+
 static bool same(const struct lumi_raster *a, const struct lumi_raster *b)
 {
     for (int y = 0; y < a->height; y++)
@@ -360,6 +385,7 @@ int main(void)
         cmocka_unit_test(neighbours_surround_the_view),
         cmocka_unit_test(depth_of_two_planes_is_found_by_cameras_in_a_plane),
         cmocka_unit_test(depth_of_two_planes_is_found_by_turned_equiangular_cameras),
+        cmocka_unit_test(depth_is_found_whatever_the_unit_of_the_poses),
         cmocka_unit_test(one_and_four_threads_give_the_same_bytes),
         cmocka_unit_test(stated_limits_hold),
         cmocka_unit_test(a_plain_image_has_some_finite_depth),
