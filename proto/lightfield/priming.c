@@ -80,7 +80,8 @@ static int read_frame(struct lumi_reader *reader, int references, bool first, st
     uint64_t reference = lumi_read_varint(reader);
     bool key;
 
-    if (reader->failed || reference > (uint64_t)references)
+    /* libvpx takes no windows before its first frame: it has nothing to copy them into, and looks not. */
+    if (reader->failed || reference > (uint64_t)references || (first && reference > 0))
         return LUMI_ERR_FORMAT;
     for (int k = 0; reference > 0 && k < LUMI_WINDOWS; k++) {
         at[k].x = (int16_t)lumi_read_u16(reader);
