@@ -6,8 +6,11 @@
 #include "sim/place.h"
 #include "sim/truth.h"
 
+#include <limits.h>
+
 static char *out, *rig_text, *from, *poses, *size_text, *format_text, *lens_text;
-static int random_count, seed = 1, threads;
+#define NOT_GIVEN INT_MIN
+static int random_count = NOT_GIVEN, seed = 1, threads;
 static double fov, scale = 1, volume, eye_distance;
 static gboolean no_depth, inward;
 
@@ -84,9 +87,9 @@ static int choose_views(struct sim_rig *views, struct lumi_error *error)
     rig_options.inward = inward;
     if (poses)
         return read_poses(views, error);
-    if (!random_count && from)
+    if (random_count == NOT_GIVEN && from)
         return sim_rig_from_capture(views, from, error);
-    if (!random_count) {
+    if (random_count == NOT_GIVEN) {
         rig_options.width = size[0];
         rig_options.height = size[1];
         rig_options.fov = fov;

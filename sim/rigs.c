@@ -186,6 +186,9 @@ int sim_rig_init(struct sim_rig *rig, const char *text, const struct sim_rig_opt
         return lumi_fail(error, LUMI_ERR_ARG, "scale %g: a number over 0, up to 1 wanted", o->scale);
     if (o->width < 0 || o->height < 0 || o->width > LUMI_RASTER_MAX || o->height > LUMI_RASTER_MAX)
         return lumi_fail(error, LUMI_ERR_ARG, "picture size %d x %d is out of range", o->width, o->height);
+    bool fisheye = o->lens == SIM_LENS_FISHEYE || (o->lens == SIM_LENS_DEFAULT && sphere && !o->inward);
+    if (!(o->fov >= 0 && o->fov <= (fisheye ? 360 : 170)))
+        return lumi_fail(error, LUMI_ERR_ARG, "field of view %g: up to %d degrees wanted", o->fov, fisheye ? 360 : 170);
     if (planar || sphere) {
         if (sscanf(text + 7, "%dx%d:%lf%n", &rows, &columns, &length, &end) != 3 || text[7 + end])
             return lumi_fail(error, LUMI_ERR_ARG, "rig %s: %s:ROWSxCOLS:%s wanted", text, planar ? "planar" : "sphere",
@@ -242,6 +245,9 @@ int sim_rig_random(const struct sim_rig *around, const struct sim_random_options
     *result = (struct sim_rig){.count = count, .rows = 1, .columns = count, .cameras = 1};
     if (o->count < 1 || o->count > VIEWS_MAX || o->width < 0 || o->height < 0 || !(o->fov > 0 && o->fov < 179))
         return lumi_fail(error, LUMI_ERR_ARG, "random views: count, size or field of view out of range");
+    if (!(o->volume >= 0 && o->volume < 1000) || !(o->eye_distance >= 0 && o->eye_distance < 1000))
+        return lumi_fail(error, LUMI_ERR_ARG, "random views: volume %g or stereo %g m out of range", o->volume,
+                         o->eye_distance);
     /* In the middle as many pixels a radian as the pictures, 4 by 3. */
     double half = around->views[0].lens.fx * tan(o->fov * DEGREE / 2);
     int width = o->width ? o->width : (int)fmin(2 * round(half), LUMI_RASTER_MAX);

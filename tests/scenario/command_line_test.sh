@@ -39,6 +39,11 @@ done
 for number in nan inf -1; do
     expect 2 "--unit" import x -o y --unit=$number
 done
+expect 2 "random views: count" sim truth room -o y --random 0
+expect 2 "random views: volume" sim truth room -o y --random 1 --stereo nan
+for fov in nan -1 500; do
+    expect 2 "field of view" sim shoot room -o y --rig planar:2x2:0.1 --fov $fov
+done
 for option in gp near far neighbours cluster disk-scale pixels-per-degree target-bytes; do
     expect 2 "--$option" process "a ü.capture" -o y --$option 0
 done
