@@ -58,13 +58,14 @@ shoot() { # FOLDER WIDTH HEIGHT
     done
 }
 
-field() { # NAME
-    "$lumi" import "$dir/$1-input/transforms.json" -o "$dir/$1.capture"
-    "$lumi" process "$dir/$1.capture" -o "$dir/$1.lumi" -q 90
+field() { # NAME [OPTIONS...]
+    name=$1
+    shift
+    [ -d "$dir/$name.capture" ] || "$lumi" import "$dir/$name-input/transforms.json" -o "$dir/$name.capture"
+    "$lumi" process "$dir/$name.capture" -o "$dir/$name.lumi" -q 90 "$@"
 }
 
 for part in planar-input planar-truth outward-input outward-truth; do mkdir -p "$dir/$part"; done
-rm -rf "$dir"/*.capture "$dir"/*.work
 
 # Planar: 5×5, 1.5 cm apart, where the scene's own camera stands, looking where it looks. Truth between the grid's places.
 plane='BEGIN {
@@ -95,7 +96,7 @@ shoot "$dir/planar-truth" 384 288
 shoot "$dir/outward-input" 256 256
 shoot "$dir/outward-truth" 192 144
 field planar
-field outward
+field outward --near 0.03 # biscuits, a hand's breadth away: nearer than is searched by default
 machine
 judge_heading
 judge "biscuit, planar" "$dir/planar.lumi" "$dir/planar-truth/transforms.json" --sheet "$dir/planar.png"
