@@ -1,10 +1,12 @@
 /* Pixels in memory. */
 #include "proto/base/raster.h"
 
+#include "proto/base/file.h"
 #include "proto/base/memory.h"
 
 #include <math.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <string.h>
 
 int lumi_raster_create(struct lumi_raster *raster, int width, int height, int channels, enum lumi_sample sample)
@@ -112,4 +114,23 @@ int lumi_raster_convert(const struct lumi_raster *source, enum lumi_sample sampl
             convert_row(source, result, y);
     }
     return LUMI_OK;
+}
+
+int lumi_raster_write_ppm(const struct lumi_raster *raster, const char *path, struct lumi_error *error)
+{
+    char header[48];
+
+    if (raster->channels != 3 || raster->sample != LUMI_U8)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: a PPM file holds three channels of bytes", path);
+    size_t begin = (size_t)snprintf(header, sizeof header, "P6\n%d %d\n255\n", raster->width, raster->height);
+    size_t row = 3 * (size_t)raster->width;
+    uint8_t *bytes = lumi_alloc(begin + row * (size_t)raster->height, 1);
+    if (!bytes)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory to write it", path);
+    memcpy(bytes, header, begin);
+    for (int y = 0; y < raster->height; y++)
+        memcpy(bytes + begin + (size_t)y * row, lumi_row_u8(raster, y), row);
+    int code = lumi_file_write(path, bytes, begin + row * (size_t)raster->height, false, error);
+    lumi_free(bytes);
+    return code;
 }

@@ -54,6 +54,9 @@ float lumi_srgb_decode(float encoded);
  * rounding to nearest, clamped to what the target holds. Channels stay. */
 int lumi_raster_convert(const struct lumi_raster *source, enum lumi_sample sample, struct lumi_raster *result);
 
+/* Writes an U8 RGB raster as a binary PPM file: for programs that have no library of pictures. */
+int lumi_raster_write_ppm(const struct lumi_raster *raster, const char *path, struct lumi_error *error);
+
 #ifdef __cplusplus
 }
 #endif

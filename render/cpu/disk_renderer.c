@@ -221,8 +221,11 @@ static int render_all(struct render *render, struct lumi_picture *picture, struc
 int lumi_render_disks(struct lumi_viewset *set, const struct lumi_lens *lens, const struct lumi_pose *pose,
                       const struct lumi_disk_settings *settings, struct lumi_picture *picture, struct lumi_error *error)
 {
+    struct lumi_disk_settings defaults;
     struct render *render;
 
+    lumi_disk_settings_default(&defaults);
+    settings = settings ? settings : &defaults;
     LUMI_TRY(check_settings(settings, error));
     lumi_shade_tables();
     render = lumi_calloc(1, sizeof *render);

@@ -34,7 +34,8 @@ struct lumi_disk_settings {
 
 void lumi_disk_settings_default(struct lumi_disk_settings *settings);
 
-/* Renders what `lens` sees from `pose`. The picture is all-zero before; release it with lumi_picture_finish. */
+/* Renders what `lens` sees from `pose`; `settings` NULL: the default ones. The picture is all-zero before; release it
+ * with lumi_picture_finish. */
 int lumi_render_disks(struct lumi_viewset *set, const struct lumi_lens *lens, const struct lumi_pose *pose,
                       const struct lumi_disk_settings *settings, struct lumi_picture *picture,
                       struct lumi_error *error);

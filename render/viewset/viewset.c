@@ -73,8 +73,10 @@ int lumi_viewset_create(int count, const struct lumi_view *views, const struct l
         LUMI_TRY(check(i, &views[i], &images[i], error));
     LUMI_TRY(lumi_viewset_alloc(count, &set, error));
     memcpy(set->views, views, (size_t)count * sizeof *views);
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         set->slots[i].pixels = images[i];
+        set->centre = lumi_add(set->centre, lumi_scale(views[i].pose.t, 1.0 / count));
+    }
     set->shape = shape;
     set->kernel = kernel;
     *result = set;
@@ -111,6 +113,14 @@ int lumi_viewset_count(const struct lumi_viewset *set)
 const struct lumi_view *lumi_viewset_view(const struct lumi_viewset *set, int view)
 {
     return &set->views[view];
+}
+
+struct lumi_pose lumi_viewset_middle(const struct lumi_viewset *set)
+{
+    struct lumi_pose pose = set->views[0].pose;
+
+    pose.t = set->centre;
+    return pose;
 }
 
 enum lumi_disk_shape lumi_viewset_shape(const struct lumi_viewset *set)

@@ -29,10 +29,14 @@ int lumi_viewset_create(int count, const struct lumi_view *views, const struct l
  * where that is damaged too; lumi_viewset_damaged counts them. */
 int lumi_viewset_from_field(const struct lumi_field *field, int level, size_t cache_bytes, struct lumi_viewset **set,
                             struct lumi_error *error);
+/* The fine level of the file at `path`, which the set keeps open, with 256 MiB for decoded images. */
+int lumi_viewset_open(const char *path, struct lumi_viewset **set, struct lumi_error *error);
 void lumi_viewset_destroy(struct lumi_viewset *set);
 
 int lumi_viewset_count(const struct lumi_viewset *set);
 const struct lumi_view *lumi_viewset_view(const struct lumi_viewset *set, int view);
+/* A place to look from: the centre of the views (a field's: as its file says; else their mean), turned as the first. */
+struct lumi_pose lumi_viewset_middle(const struct lumi_viewset *set);
 enum lumi_disk_shape lumi_viewset_shape(const struct lumi_viewset *set);
 enum lumi_disk_kernel lumi_viewset_kernel(const struct lumi_viewset *set);
 int lumi_viewset_damaged(struct lumi_viewset *set);

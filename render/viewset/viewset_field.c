@@ -5,8 +5,11 @@
 
 #include <string.h>
 
+#define CACHE_BYTES ((size_t)256 << 20)
+
 struct source {
     const struct lumi_field *field;
+    struct lumi_field *own; /* the field, where it was opened for this set */
     int level;
     struct lumi_tile_decoder **idle; /* decoders nobody uses; room for all there are */
     int idle_count, made;
@@ -198,6 +201,7 @@ static void destroy_source(void *state)
     for (int i = 0; i < source->idle_count; i++)
         lumi_tile_decoder_destroy(source->idle[i]);
     lumi_free(source->idle);
+    lumi_field_close(source->own);
     pthread_mutex_destroy(&source->lock);
     lumi_free(source);
 }
@@ -229,6 +233,7 @@ int lumi_viewset_from_field(const struct lumi_field *field, int level, size_t ca
                                            .disk = view->disk,
                                            .mesh = lumi_field_mesh(field, level, i)};
     }
+    set->centre = info->centre;
     set->shape = info->disk_shape;
     set->kernel = info->kernel;
     set->source = &from_field;
@@ -236,4 +241,17 @@ int lumi_viewset_from_field(const struct lumi_field *field, int level, size_t ca
     set->cache_bytes = cache_bytes;
     *result = set;
     return LUMI_OK;
+}
+
+int lumi_viewset_open(const char *path, struct lumi_viewset **set, struct lumi_error *error)
+{
+    struct lumi_field *field;
+
+    LUMI_TRY(lumi_field_open(path, 0, &field, error));
+    int code = lumi_viewset_from_field(field, LUMI_LEVEL_FINE, CACHE_BYTES, set, error);
+    if (code == LUMI_OK)
+        ((struct source *)(*set)->state)->own = field;
+    else
+        lumi_field_close(field);
+    return code;
 }

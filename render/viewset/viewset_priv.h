@@ -28,6 +28,7 @@ struct lumi_viewset {
     int count;
     struct lumi_view *views;
     struct lumi_slot *slots;
+    struct lumi_vec3 centre;
     enum lumi_disk_shape shape;
     enum lumi_disk_kernel kernel;
     /* NULL for a set from memory. decode makes a view's pixels; it is called without the lock. */

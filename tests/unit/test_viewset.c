@@ -1,6 +1,7 @@
 /* render/viewset: views of a field, decoded, kept, let go, patched where they are damaged. */
 #include "render/viewset/viewset.h"
 
+#include "proto/base/file.h"
 #include "proto/base/parallel.h"
 #include "render/cpu/disk_renderer.h"
 #include "tests/unit/synthetic_field.h"
@@ -9,6 +10,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include <cmocka.h>
@@ -181,12 +183,54 @@ static void a_damaged_tile_shows_the_coarse_level_s_picture(void **state)
     lumi_free(copy);
 }
 
+static void a_set_opened_from_a_file_is_the_field_s_and_renders_as_it_is(void **state)
+{
+    static const char *const path = "test_viewset.lumi", *const picture_path = "test_viewset.ppm";
+    struct lumi_field *field = open_bytes(file.data);
+    struct lumi_viewset *set = open_set(field, 1 << 20), *opened = NULL;
+    struct lumi_pose pose = lumi_viewset_middle(set);
+    struct lumi_disk_settings settings;
+    struct lumi_lens lens;
+    struct lumi_picture a, b;
+    uint8_t *ppm;
+    size_t size;
+
+    (void)state;
+    assert_int_equal(lumi_viewset_open("no_such.lumi", &opened, NULL), LUMI_ERR_NOTFOUND);
+    assert_int_equal(lumi_file_write(path, file.data, file.size, false, NULL), LUMI_OK);
+    assert_int_equal(lumi_viewset_open(path, &opened, NULL), LUMI_OK);
+    assert_int_equal(lumi_viewset_count(opened), lumi_viewset_count(set));
+    assert_memory_equal(&pose.t, &lumi_field_info(field)->centre, sizeof pose.t);
+    assert_memory_equal(pose.r, lumi_viewset_view(set, 0)->pose.r, sizeof pose.r);
+
+    lumi_disk_settings_default(&settings);
+    lumi_lens_init_pinhole(&lens, 61, 48, 0.8);
+    assert_int_equal(lumi_render_disks(set, &lens, &pose, &settings, &a, NULL), LUMI_OK);
+    assert_int_equal(lumi_render_disks(opened, &lens, &pose, NULL, &b, NULL), LUMI_OK);
+    assert_int_equal(lumi_raster_write_ppm(&b.color, picture_path, NULL), LUMI_OK);
+    assert_int_equal(lumi_file_read(picture_path, 1 << 20, &ppm, &size, NULL), LUMI_OK);
+    assert_int_equal(size, 13 + 61 * 48 * 3);
+    assert_memory_equal(ppm, "P6\n61 48\n255\n", 13);
+    for (int y = 0; y < 48; y++)
+        assert_memory_equal(ppm + 13 + 61 * 3 * y, lumi_row_u8(&a.color, y), 61 * 3);
+    assert_int_equal(lumi_raster_write_ppm(&b.weight, picture_path, NULL), LUMI_ERR_ARG);
+    lumi_free(ppm);
+    lumi_picture_finish(&a);
+    lumi_picture_finish(&b);
+    lumi_viewset_destroy(opened);
+    lumi_viewset_destroy(set);
+    lumi_field_close(field);
+    remove(path);
+    remove(picture_path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_view_between_those_of_a_field_is_the_truth),
         cmocka_unit_test(a_cache_too_small_for_two_views_gives_the_same_pixels),
         cmocka_unit_test(many_threads_may_take_and_release_views),
+        cmocka_unit_test(a_set_opened_from_a_file_is_the_field_s_and_renders_as_it_is),
         cmocka_unit_test(a_damaged_tile_shows_the_coarse_level_s_picture),
     };
 
