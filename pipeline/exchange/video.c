@@ -1,21 +1,21 @@
 /* WebM files. */
 #include "pipeline/exchange/video.h"
 
+#include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/lightfield/yuv.h"
 
-#include <fcntl.h>
 #include <glib.h>
 #include <libavformat/avformat.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 #include <vpx/vp8cx.h>
 #include <vpx/vpx_encoder.h>
 
 struct lumi_video {
-    char *path, *temporary;
+    char *path;
+    struct lumi_new_file file; /* fd −1: not open */
     int width, height;
     long frames;
     AVRational base; /* of the encoder's clock: one picture */
@@ -92,7 +92,8 @@ static int open_file(struct lumi_video *video, struct lumi_error *error)
     p->color_trc = AVCOL_TRC_IEC61966_2_1;
     video->stream->time_base = video->base;
     video->stream->avg_frame_rate = av_inv_q(video->base);
-    code = avio_open(&video->format->pb, video->temporary, AVIO_FLAG_WRITE);
+    LUMI_TRY(lumi_new_file_open(&video->file, video->path, error));
+    code = avio_open(&video->format->pb, video->file.temporary, AVIO_FLAG_WRITE);
     if (code < 0)
         return fail_av(error, video, "cannot be written", code);
     code = avformat_write_header(video->format, NULL);
@@ -113,7 +114,7 @@ int lumi_video_create(const char *path, int width, int height, int frames_per_se
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory for a video", path);
     av_log_set_level(AV_LOG_QUIET);
     video->path = g_strdup(path);
-    video->temporary = g_strdup_printf("%s.%ld.tmp", path, (long)getpid());
+    video->file.fd = -1;
     video->width = width;
     video->height = height;
     video->base = (AVRational){1, frames_per_second};
@@ -194,17 +195,8 @@ static int finish_file(struct lumi_video *video, struct lumi_error *error)
     if (code < 0)
         return fail_av(error, video, "writing the end", code);
     code = avio_closep(&video->format->pb);
-    if (code < 0)
-        return fail_av(error, video, "writing the end", code);
-    int file = open(video->temporary, O_RDONLY | O_CLOEXEC);
-    int synced = file >= 0 ? fsync(file) : -1;
-    if (synced)
-        lumi_fail_errno(error, video->path, "reaching the disk");
-    if (file >= 0)
-        close(file);
-    if (synced)
-        return error ? error->code : LUMI_ERR_IO;
-    return rename(video->temporary, video->path) ? lumi_fail_errno(error, video->path, "giving it its name") : LUMI_OK;
+    return code < 0 ? fail_av(error, video, "writing the end", code)
+                    : lumi_new_file_close(&video->file, LUMI_OK, true, error);
 }
 
 int lumi_video_finish(struct lumi_video *video, struct lumi_error *error)
@@ -221,13 +213,12 @@ void lumi_video_abandon(struct lumi_video *video)
         return;
     if (video->format && video->format->pb)
         avio_closep(&video->format->pb);
-    if (video->temporary)
-        unlink(video->temporary); /* there is none after a rename */
+    if (video->file.fd >= 0)
+        lumi_new_file_close(&video->file, LUMI_ERR_CANCELLED, false, NULL);
     av_packet_free(&video->packet);
     avformat_free_context(video->format);
     if (video->codec_ready)
         vpx_codec_destroy(&video->codec);
     g_free(video->path);
-    g_free(video->temporary);
     lumi_free(video);
 }

@@ -1,13 +1,12 @@
 /* From the work directory to where the user wants it. */
 #include "pipeline/graph/deliver.h"
 
+#include "proto/base/file.h"
 #include "proto/base/memory.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <glib.h>
-#include <stdio.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 enum { BLOCK = 1 << 20 };
@@ -43,8 +42,6 @@ static int copy(int in, int out, const char *from, const char *to, struct lumi_e
             break;
         LUMI_GOTO(code, out, write_all(out, block, (size_t)count, to, error));
     }
-    if (code == LUMI_OK && fsync(out))
-        code = lumi_fail_errno(error, to, "sync");
 out:
     lumi_free(block);
     return code;
@@ -52,25 +49,17 @@ out:
 
 int lumi_deliver(const char *from, const char *to, struct lumi_error *error)
 {
-    g_autofree char *temporary = g_strdup_printf("%s.tmp-%ld", to, (long)getpid());
-    int in = open(from, O_RDONLY | O_CLOEXEC), out = -1, code;
+    int in = open(from, O_RDONLY | O_CLOEXEC);
+    struct lumi_new_file out;
 
     if (in < 0)
         return lumi_fail_errno(error, from, "open");
-    out = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (out < 0) {
-        code = lumi_fail_errno(error, to, "create");
-        close(in);
-        return code;
+    int code = lumi_new_file_open(&out, to, error);
+    if (code == LUMI_OK) {
+        code = copy(in, out.fd, from, to, error);
+        code = lumi_new_file_close(&out, code, true, error);
     }
-    code = copy(in, out, from, to, error);
     close(in);
-    if (close(out) && code == LUMI_OK)
-        code = lumi_fail_errno(error, to, "close");
-    if (code == LUMI_OK && rename(temporary, to))
-        code = lumi_fail_errno(error, to, "rename");
-    if (code != LUMI_OK)
-        unlink(temporary);
     return code;
 }
 

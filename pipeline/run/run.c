@@ -92,6 +92,12 @@ static int lock_work(struct lumi_run *run, bool alone, struct lumi_error *error)
     if (g_mkdir_with_parents(run->work, 0777))
         return lumi_fail_errno(error, run->work, "create");
     run->priv->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (run->priv->lock < 0 && !alone && (errno == EROFS || errno == EACCES)) {
+        /* What cannot be written here can still be read, beside others that hold the lock as far as there is one. */
+        run->priv->lock = open(path, O_RDONLY | O_CLOEXEC);
+        if (run->priv->lock < 0)
+            return LUMI_OK;
+    }
     if (run->priv->lock < 0)
         return lumi_fail_errno(error, path, "create");
     if (flock(run->priv->lock, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB))

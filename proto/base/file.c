@@ -3,12 +3,15 @@
 
 #include "proto/base/memory.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -77,11 +80,18 @@ static int write_all(int fd, const uint8_t *data, size_t size)
     return 0;
 }
 
+/* The folder of a path: "." where it names none. Released with free. */
+static char *folder_of(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+
+    return slash ? strndup(path, slash == path ? 1 : (size_t)(slash - path)) : strdup(".");
+}
+
 /* So that the new name itself survives a power cut. */
 static void sync_folder_of(const char *path)
 {
-    const char *slash = strrchr(path, '/');
-    char *folder = slash ? strndup(path, slash == path ? 1 : (size_t)(slash - path)) : strdup(".");
+    char *folder = folder_of(path);
     int fd = folder ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
 
     if (fd >= 0) {
@@ -91,43 +101,98 @@ static void sync_folder_of(const char *path)
     free(folder);
 }
 
-int lumi_file_write(const char *path, const void *data, size_t size, bool sync, struct lumi_error *error)
+/* Whether `name` is "<base>.tmp-<process>-<count>" and that process is no more. */
+static bool left_behind(const char *name, const char *base, size_t length)
+{
+    long process;
+    unsigned count;
+    int end = 0;
+
+    if (strncmp(name, base, length) != 0 || strncmp(name + length, ".tmp-", 5) != 0 ||
+        sscanf(name + length + 5, "%ld-%u%n", &process, &count, &end) != 2 || name[length + 5 + (size_t)end])
+        return false;
+    return process > 0 && kill((pid_t)process, 0) != 0 && errno == ESRCH;
+}
+
+/* A lock that is held says that its writer lives on another machine, or where process numbers are counted apart. */
+static void remove_unlocked(int folder, const char *name)
+{
+    int fd = openat(folder, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+
+    if (fd < 0)
+        return;
+    if (flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
+        unlinkat(folder, name, 0);
+    close(fd);
+}
+
+static void remove_leftovers(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *base = slash ? slash + 1 : path;
+    char *folder = folder_of(path);
+    DIR *dir = folder ? opendir(folder) : NULL;
+    const struct dirent *entry;
+
+    while (dir && (entry = readdir(dir)))
+        if (left_behind(entry->d_name, base, strlen(base)))
+            remove_unlocked(dirfd(dir), entry->d_name);
+    if (dir)
+        closedir(dir);
+    free(folder);
+}
+
+int lumi_new_file_open(struct lumi_new_file *file, const char *path, struct lumi_error *error)
 {
     size_t length = strlen(path) + 48;
-    char *temporary = lumi_alloc(length, 1);
-    const char *doing = "cannot write";
-    int code = LUMI_OK;
-    int fd;
+    int code;
 
-    if (!temporary)
-        return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory to write it", path);
-    /* Process and a count make the name unique on one machine; what a killed process left is stepped over. */
+    *file = (struct lumi_new_file){.fd = -1, .path = lumi_alloc(length, 1), .temporary = lumi_alloc(length, 1)};
+    if (!file->path || !file->temporary) {
+        code = lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory to write it", path);
+        goto fail;
+    }
+    memcpy(file->path, path, strlen(path) + 1);
+    remove_leftovers(path);
+    /* Process and a count make the name unique on one machine; what is there in spite of it is stepped over. */
     do {
-        snprintf(temporary, length, "%s.part-%ld-%u", path, (long)getpid(), atomic_fetch_add(&names, 1));
-        fd = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    } while (fd < 0 && errno == EEXIST);
-    if (fd < 0) {
-        code = lumi_fail_errno(error, path, "cannot make a file there");
-        lumi_free(temporary);
-        return code;
+        snprintf(file->temporary, length, "%s.tmp-%ld-%u", path, (long)getpid(), atomic_fetch_add(&names, 1));
+        file->fd = open(file->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    } while (file->fd < 0 && errno == EEXIST);
+    if (file->fd >= 0) {
+        flock(file->fd, LOCK_EX | LOCK_NB); /* where there are no locks, the process's number has to do */
+        return LUMI_OK;
     }
-    int failed = write_all(fd, data, size) || (sync && fsync(fd));
-    int number = errno;
-    if (close(fd) && !failed) {
-        failed = 1;
-        number = errno;
-    }
-    errno = number;
-    if (!failed && rename(temporary, path)) {
-        failed = 1;
-        doing = "cannot give the finished file its name";
-    }
-    if (failed) {
-        code = lumi_fail_errno(error, path, doing);
-        unlink(temporary);
-    } else if (sync) {
-        sync_folder_of(path);
-    }
-    lumi_free(temporary);
+    code = lumi_fail_errno(error, path, "cannot make a file there");
+fail:
+    lumi_free(file->path);
+    lumi_free(file->temporary);
+    *file = (struct lumi_new_file){.fd = -1};
     return code;
+}
+
+int lumi_new_file_close(struct lumi_new_file *file, int code, bool sync, struct lumi_error *error)
+{
+    if (code == LUMI_OK && sync && fsync(file->fd))
+        code = lumi_fail_errno(error, file->path, "cannot write");
+    if (close(file->fd) && code == LUMI_OK)
+        code = lumi_fail_errno(error, file->path, "cannot write");
+    if (code == LUMI_OK && rename(file->temporary, file->path))
+        code = lumi_fail_errno(error, file->path, "cannot give the finished file its name");
+    if (code != LUMI_OK)
+        unlink(file->temporary);
+    else if (sync)
+        sync_folder_of(file->path);
+    lumi_free(file->path);
+    lumi_free(file->temporary);
+    *file = (struct lumi_new_file){.fd = -1};
+    return code;
+}
+
+int lumi_file_write(const char *path, const void *data, size_t size, bool sync, struct lumi_error *error)
+{
+    struct lumi_new_file file;
+
+    LUMI_TRY(lumi_new_file_open(&file, path, error));
+    int code = write_all(file.fd, data, size) ? lumi_fail_errno(error, path, "cannot write") : LUMI_OK;
+    return lumi_new_file_close(&file, code, sync, error);
 }

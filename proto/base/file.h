@@ -16,6 +16,18 @@ extern "C" {
  * zero byte stands after its end, so that text can be parsed in place. */
 int lumi_file_read(const char *path, size_t limit, uint8_t **data, size_t *size, struct lumi_error *error);
 
+/* A file that appears under its name when it is whole: written as "<path>.tmp-<process>-<count>", which is locked
+ * (flock) until then. */
+struct lumi_new_file {
+    char *path, *temporary;
+    int fd; /* to be written to */
+};
+/* Also removes what processes that were killed have left of earlier files of this name. */
+int lumi_new_file_open(struct lumi_new_file *file, const char *path, struct lumi_error *error);
+/* `code` LUMI_OK: renames it; otherwise removes it. `sync`: its bytes and its folder reach the disk before this
+ * returns. Returns `code`, or why it could not be kept. */
+int lumi_new_file_close(struct lumi_new_file *file, int code, bool sync, struct lumi_error *error);
+
 /* Makes or replaces a file: whole or not at all. `sync`: its bytes and its folder reach the disk before this returns.
  */
 int lumi_file_write(const char *path, const void *data, size_t size, bool sync, struct lumi_error *error);

@@ -1,12 +1,12 @@
 /* Writing a field: header and section table last, sections one after the other before. */
 #include "proto/lightfield/field_write.h"
 
+#include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/lightfield/cluster_code.h"
 #include "proto/lightfield/field_layout.h"
 #include "proto/lightfield/side_info.h"
 
-#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -532,39 +532,37 @@ int lumi_field_write_memory(const struct lumi_field_content *content, struct lum
     return code;
 }
 
-static int write_file(const char *temporary, const char *path, const struct lumi_field_content *content,
-                      struct sink *sink, struct lumi_error *error)
+static int write_file(int fd, const char *path, const struct lumi_field_content *content, struct sink *sink,
+                      struct lumi_error *error)
 {
+    int own = dup(fd); /* fclose closes what it is given */
+
     sink->path = path;
-    sink->file = fopen(temporary, "wb");
-    if (!sink->file)
-        return lumi_fail_errno(error, path, "create");
+    sink->file = own >= 0 ? fdopen(own, "wb") : NULL;
+    if (!sink->file) {
+        int code = lumi_fail_errno(error, path, "create");
+        if (own >= 0)
+            close(own);
+        return code;
+    }
     int code = put_all(sink, content, error);
-    if (code == LUMI_OK && (fflush(sink->file) || fsync(fileno(sink->file))))
-        code = lumi_fail_errno(error, path, "write");
     if (fclose(sink->file) && code == LUMI_OK)
         code = lumi_fail_errno(error, path, "write");
-    if (code == LUMI_OK && rename(temporary, path))
-        code = lumi_fail_errno(error, path, "rename");
-    if (code != LUMI_OK)
-        unlink(temporary);
     return code;
 }
 
 int lumi_field_write(const char *path, const struct lumi_field_content *content, struct lumi_error *error)
 {
-    size_t size = strlen(path) + 32;
-    char *temporary = lumi_alloc(size, 1);
     struct sink *sink = lumi_calloc(1, sizeof *sink);
-    int code;
+    struct lumi_new_file file;
 
-    if (temporary && sink) {
-        snprintf(temporary, size, "%s.tmp-%ld", path, (long)getpid());
-        code = write_file(temporary, path, content, sink, error);
-    } else {
-        code = lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a field");
+    if (!sink)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a field");
+    int code = lumi_new_file_open(&file, path, error);
+    if (code == LUMI_OK) {
+        code = write_file(file.fd, path, content, sink, error);
+        code = lumi_new_file_close(&file, code, true, error);
     }
-    lumi_free(temporary);
     lumi_free(sink);
     return code;
 }

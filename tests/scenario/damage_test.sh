@@ -2,12 +2,8 @@
 # damage_test.sh LUMI DAMAGE_FIELD: what `lumi render` does with damaged files: a picture, or one line that names the file
 # and exit status 3; nothing half-written, no crash, no hang.
 lumi=$1
-scratch=$(mktemp -d) || exit 1
-trap 'rm -rf "$scratch"' EXIT
-fail() {
-    echo "damage_test: $1" >&2
-    exit 1
-}
+# shellcheck source=tests/scenario/expect.sh
+. "$(dirname "$0")/expect.sh"
 
 mkdir "$scratch/in" "$scratch/out"
 "$2" "$scratch/in" || fail "no damaged files"

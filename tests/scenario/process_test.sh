@@ -2,22 +2,9 @@
 # process_test.sh LUMI: from a simulated place to pictures, as a person does it, with everything that may come between:
 # runs that are killed, other numbers of threads, stages piece by piece, sizes asked for.
 lumi=$1
-scratch=$(mktemp -d) || exit 1
-trap 'rm -rf "$scratch"' EXIT
+# shellcheck source=tests/scenario/expect.sh
+. "$(dirname "$0")/expect.sh"
 cd "$scratch" || exit 1
-fail() {
-    echo "process_test: $1" >&2
-    exit 1
-}
-expect() { # STATUS PART COMMAND...: exit status and a part of what is printed
-    wanted=$1
-    part=$2
-    shift 2
-    out=$("$@" 2>&1)
-    status=$?
-    [ $status -eq "$wanted" ] || fail "'$*' ended with $status, not $wanted: $out"
-    echo "$out" | grep -Fq -e "$part" || fail "'$*' did not say '$part': $out"
-}
 same() { cmp -s "$1" "$2" || fail "$1 and $2 differ: $3"; }
 size() { wc -c <"$1" | tr -d ' '; }
 be32() { od -An -tu1 -j"$2" -N4 "$1" | awk '{ print (($1 * 256 + $2) * 256 + $3) * 256 + $4 }'; }
@@ -67,6 +54,13 @@ done
 "$lumi" process a -o killed.lumi -w killed $options >/dev/null || fail "process after kills"
 same one.lumi killed.lumi "killed and resumed"
 [ -z "$(find killed -name '*.tmp-*')" ] || fail "left behind: $(find killed -name '*.tmp-*')"
+
+# What a run left beside the output that was killed in the last copy goes with the next one.
+dead=$(sh -c 'echo $$')
+touch "killed.lumi.tmp-$dead-0" "killed.lumi.tmp-$$-0" "killed.lumi.tmp-x"
+"$lumi" process a -o killed.lumi -w killed $options >/dev/null || fail "process beside leftovers"
+[ ! -e "killed.lumi.tmp-$dead-0" ] || fail "what a dead process left is still there"
+[ -e "killed.lumi.tmp-$$-0" ] && [ -e killed.lumi.tmp-x ] || fail "more went than what dead processes left"
 
 # What was half-written and what was cut off is made again.
 depth=$(find a.work/depth -name '*.exr' | sort | head -1)

@@ -3,21 +3,8 @@
 lumi=$1
 make=$2
 here=$(dirname "$0")
-scratch=$(mktemp -d) || exit 1
-trap 'rm -rf "$scratch"' EXIT
-fail() {
-    echo "verify_test: $1" >&2
-    exit 1
-}
-expect() { # STATUS PART COMMAND...: exit status and a part of what is printed
-    wanted=$1
-    part=$2
-    shift 2
-    out=$("$@" 2>&1)
-    status=$?
-    [ $status -eq "$wanted" ] || fail "'$*' ended with $status, not $wanted: $out"
-    echo "$out" | grep -Fq -e "$part" || fail "'$*' did not say '$part': $out"
-}
+# shellcheck source=tests/scenario/expect.sh
+. "$(dirname "$0")/expect.sh"
 
 "$make" "$scratch/a" || fail "no capture"
 "$here/bagit_check.sh" "$scratch/a" || fail "the sealed capture is no BagIt bag"

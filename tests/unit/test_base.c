@@ -1,5 +1,6 @@
 /* proto/base: what everything else stands on. */
 #include "proto/base/bytes.h"
+#include "proto/base/file.h"
 #include "proto/base/geometry.h"
 #include "proto/base/lens.h"
 #include "proto/base/memory.h"
@@ -7,6 +8,7 @@
 #include "proto/base/raster.h"
 #include "proto/base/result.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <float.h>
 #include <math.h>
@@ -14,7 +16,11 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -222,10 +228,78 @@ static void an_error_is_one_line_whatever_the_name_in_it(void **state)
     assert_string_equal(error.text, "x?y: frame 'a?b?[2J?\xc3\xa9' is unknown");
 }
 
+/* A process that dies with a new file open leaves it behind. */
+static void die_writing(const char *path)
+{
+    struct lumi_new_file file;
+    pid_t child = fork();
+
+    if (child == 0)
+        _exit(lumi_new_file_open(&file, path, NULL) == LUMI_OK && write(file.fd, "half", 4) == 4 ? 0 : 1);
+    int status = -1;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+}
+
+/* Files in a folder, and how many of them begin with `begin`. */
+static int count_files(const char *folder, const char *begin, int *beginning)
+{
+    DIR *dir = opendir(folder);
+    const struct dirent *entry;
+    int count = 0;
+
+    *beginning = 0;
+    assert_non_null(dir);
+    while ((entry = readdir(dir)))
+        if (entry->d_name[0] != '.') {
+            count++;
+            *beginning += !strncmp(entry->d_name, begin, strlen(begin));
+        }
+    closedir(dir);
+    return count;
+}
+
+static void what_a_killed_writer_left_goes_with_the_next_of_that_name(void **state)
+{
+    char folder[] = "/tmp/lumi-base-XXXXXX", path[64], other[64], mine[96];
+    struct lumi_new_file living;
+    int left;
+
+    (void)state;
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/a.lumi", folder);
+    snprintf(other, sizeof other, "%s/b.lumi", folder);
+    die_writing(path);
+    die_writing(other);
+    assert_int_equal(count_files(folder, "a.lumi.tmp-", &left), 2);
+    assert_int_equal(left, 1);
+
+    assert_int_equal(lumi_new_file_open(&living, path, NULL), LUMI_OK); /* takes away the dead one's */
+    assert_int_equal(count_files(folder, "a.lumi.tmp-", &left), 2);
+    assert_int_equal(lumi_file_write(path, "whole", 5, false, NULL), LUMI_OK); /* leaves the living one's */
+    assert_int_equal(count_files(folder, "a.lumi.tmp-", &left), 3);
+    assert_int_equal(left, 1);
+
+    /* A number that is no process's here, but a writer that holds its lock: it lives where numbers are others. */
+    snprintf(mine, sizeof mine, "%s.tmp-%ld-7", path, (long)INT32_MAX);
+    assert_int_equal(rename(living.temporary, mine), 0);
+    assert_int_equal(lumi_file_write(path, "whole", 5, true, NULL), LUMI_OK);
+    assert_int_equal(access(mine, F_OK), 0);
+    assert_int_equal(rename(mine, living.temporary), 0);
+    assert_int_equal(lumi_new_file_close(&living, LUMI_ERR_CANCELLED, false, NULL), LUMI_ERR_CANCELLED);
+    assert_int_equal(count_files(folder, "a.lumi", &left), 2);
+    assert_int_equal(left, 1);
+    assert_int_equal(lumi_file_write(other, "whole", 5, false, NULL), LUMI_OK);
+    assert_int_equal(count_files(folder, "b.lumi", &left), 2);
+    assert_int_equal(left, 1);
+    assert_int_equal(unlink(path) | unlink(other) | rmdir(folder), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_error_is_one_line_whatever_the_name_in_it),
+        cmocka_unit_test(what_a_killed_writer_left_goes_with_the_next_of_that_name),
         cmocka_unit_test(crc32c_gives_the_published_check_value),
         cmocka_unit_test(a_reader_past_its_end_gives_zeros_and_stays_failed),
         cmocka_unit_test(varints_survive_the_round_trip_and_overlong_ones_are_refused),

@@ -1,7 +1,7 @@
 /* The stages "match" and "depth" on a capture of a wall: what they leave, what makes them run again. */
 #include "pipeline/depth/depth.h"
-#include "proto/capture/capture.h"
 #include "proto/image/image.h"
+#include "tests/unit/run_fixture.h"
 
 #include <glib.h>
 #include <math.h>
@@ -21,45 +21,24 @@ enum { SIDE = 3, IMAGES = SIDE * SIDE, WIDTH = 128, HEIGHT = 96, FOCAL = 120 };
 static char *folder;
 static int version_of_last = 0; /* raised, it changes the last view's key */
 
+static struct lumi_pose pose_of(int row, int column)
+{
+    return (struct lumi_pose){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {SPACING * column, SPACING * row, 0}};
+}
+
 static int make_capture(void **state)
 {
-    struct lumi_capture *capture;
-    struct lumi_capture_lens lens = {.name = "lens"};
-    struct lumi_error error = {0};
-    int64_t lens_id, camera, frame;
+    static const struct run_fixture fixture = {WIDTH, HEIGHT, IMAGES, SIDE, IMAGES, pose_of};
 
     (void)state;
-    folder = g_dir_make_tmp("lumi-depth-XXXXXX", NULL);
-    g_autofree char *path = g_build_filename(folder, "capture", NULL);
-    lumi_lens_init_pinhole(&lens.lens, WIDTH, HEIGHT, 1);
-    assert_int_equal(lumi_capture_create(path, &capture, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_add_lens(capture, &lens, &lens_id, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_add_camera(capture, "camera", lens_id, &camera, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_begin(capture, &error), LUMI_OK);
-    for (int i = 0; i < IMAGES; i++) {
-        g_autofree char *name = g_strdup_printf("view%02d", i);
-        const struct lumi_capture_new_frame new_frame = {
-            .name = name, .camera = camera, .row = i / SIDE, .column = i % SIDE};
-        const struct lumi_capture_file file = {
-            .extension = ".png", .width = WIDTH, .height = HEIGHT, .camera_time_us = LUMI_NO_TIME};
-        struct lumi_pose pose = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {SPACING * (i % SIDE), SPACING * (double)(i / SIDE), 0}};
-        assert_int_equal(lumi_capture_add_frame(capture, &new_frame, &frame, &error), LUMI_OK);
-        assert_int_equal(lumi_capture_store_bytes(capture, frame, name, strlen(name), &file, &error), LUMI_OK);
-        assert_int_equal(lumi_capture_set_pose(capture, frame, &pose, LUMI_POSE_TRUE, "test", &error), LUMI_OK);
-    }
-    assert_int_equal(lumi_capture_commit(capture, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_publish(capture, NULL, &error), LUMI_OK);
-    lumi_capture_close(capture);
+    folder = make_run_fixture(&fixture);
     return 0;
 }
 
 static int remove_capture(void **state)
 {
-    g_autofree char *command = g_strdup_printf("rm -rf '%s'", folder);
-
     (void)state;
-    g_free(folder);
-    return g_spawn_command_line_sync(command, NULL, NULL, NULL, NULL) ? 0 : 1;
+    return remove_run_fixture(folder);
 }
 
 /* Stands in for the stage before: the wall as each camera sees it. */

@@ -1,6 +1,6 @@
 /* pipeline/run: stages are run once, skipped when nothing changed, resumed after a failure, atomic. */
 #include "pipeline/run/run.h"
-#include "proto/capture/capture.h"
+#include "tests/unit/run_fixture.h"
 
 #include <glib.h>
 #include <glib/gstdio.h>
@@ -20,46 +20,27 @@ static char *folder;
 static atomic_int made;
 static int fail_at = -1, parameter = 1;
 
+static struct lumi_pose pose_of(int row, int column)
+{
+    struct lumi_pose pose;
+
+    lumi_pose_look(lumi_vec3(column, 0, row), lumi_vec3(0, 1, 0), lumi_vec3(0, 0, 1), &pose);
+    return pose;
+}
+
 static int make_capture(void **state)
 {
-    struct lumi_capture *capture;
-    struct lumi_capture_lens lens = {.name = "lens"};
-    struct lumi_error error = {0};
-    int64_t lens_id, camera, frame;
+    static const struct run_fixture fixture = {8, 6, IMAGES, 4, IMAGES - 1, pose_of}; /* the last one has no pose */
 
     (void)state;
-    folder = g_dir_make_tmp("lumi-run-XXXXXX", NULL);
-    g_autofree char *path = g_build_filename(folder, "capture", NULL);
-    lumi_lens_init_pinhole(&lens.lens, 8, 6, 1);
-    assert_int_equal(lumi_capture_create(path, &capture, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_add_lens(capture, &lens, &lens_id, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_add_camera(capture, "camera", lens_id, &camera, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_begin(capture, &error), LUMI_OK);
-    for (int i = 0; i < IMAGES; i++) {
-        g_autofree char *name = g_strdup_printf("view%02d", i);
-        const struct lumi_capture_new_frame new_frame = {.name = name, .camera = camera, .row = i / 4, .column = i % 4};
-        const struct lumi_capture_file file = {
-            .extension = ".png", .width = 8, .height = 6, .camera_time_us = LUMI_NO_TIME};
-        struct lumi_pose pose;
-        lumi_pose_look(lumi_vec3(i % 4, 0, i / 4), lumi_vec3(0, 1, 0), lumi_vec3(0, 0, 1), &pose);
-        assert_int_equal(lumi_capture_add_frame(capture, &new_frame, &frame, &error), LUMI_OK);
-        assert_int_equal(lumi_capture_store_bytes(capture, frame, name, strlen(name), &file, &error), LUMI_OK);
-        if (i < IMAGES - 1) /* the last one has no pose */
-            assert_int_equal(lumi_capture_set_pose(capture, frame, &pose, LUMI_POSE_TRUE, "test", &error), LUMI_OK);
-    }
-    assert_int_equal(lumi_capture_commit(capture, &error), LUMI_OK);
-    assert_int_equal(lumi_capture_publish(capture, NULL, &error), LUMI_OK);
-    lumi_capture_close(capture);
+    folder = make_run_fixture(&fixture);
     return 0;
 }
 
 static int remove_capture(void **state)
 {
-    g_autofree char *command = g_strdup_printf("rm -rf '%s'", folder);
-
     (void)state;
-    g_free(folder);
-    return g_spawn_command_line_sync(command, NULL, NULL, NULL, NULL) ? 0 : 1;
+    return remove_run_fixture(folder);
 }
 
 static struct lumi_run *open_run(bool alone)
