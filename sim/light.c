@@ -87,7 +87,7 @@ static struct sim_v3 from_light(const struct sim_scene *scene, const struct sim_
         float solid = part * other / (distance * distance + part / (float)LUMI_PI);
         sum = v3_along(sum, rough_radiance(scene, &ray, &hit, true), cosine * solid / (float)LUMI_PI);
     }
-    return sum;
+    return v3_scale(sum, light->gain);
 }
 
 static struct sim_v3 gather(const struct sim_scene *scene, struct sim_v3 p, struct sim_v3 n)

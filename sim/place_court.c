@@ -244,6 +244,7 @@ static void build(struct sim_scene *s)
                               .horizon = {0.62f, 0.72f, 0.82f},
                               .ground = {0.2f, 0.2f, 0.16f},
                               .clouds = 0.45f,
+                              .cloud = 1.15f,
                               .sun_direction = v3_unit(v3(0.55f, -0.45f, 0.70f)),
                               .sun = {1.35f, 1.25f, 1.08f},
                               .sun_radius = 0.006f,

@@ -21,7 +21,7 @@ static void backdrop(struct sim_scene *s)
     /* A shining panel above. */
     sim_scene_place(s, v3(0, 0, 0), 0, 1);
     sim_quad(s, v3(-w, w, r - 0.02f), v3(2 * w, 0, 0), v3(0, -2 * w, 0), 0.4f, lamp);
-    sim_scene_light(s, v3(-w, w, r - 0.02f), v3(2 * w, 0, 0), v3(0, -2 * w, 0));
+    sim_scene_light(s, v3(-w, w, r - 0.02f), v3(2 * w, 0, 0), v3(0, -2 * w, 0), 1);
 }
 
 static void build(struct sim_scene *s)
@@ -51,7 +51,7 @@ static void build(struct sim_scene *s)
     sim_vase(s, 0.26f, glaze);
     for (int i = 0; i < 14; i++) {
         float a = 2.4f * (float)i, up = 0.2f + 0.13f * sim_hash(i, 1, 5);
-        sim_leaf(s, v3(0, 0, 0.24f), v3(cosf(a), sinf(a), 1.4f), v3(0, 0, 1), up, 0.05f, 0.9f, green);
+        sim_leaf(s, v3(0, 0, 0.24f), v3(cosf(a), sinf(a), 1.4f), v3(0, 0, 1), up, 0.05f, 0.9f, 5, green);
     }
     sim_scene_place(s, v3(0.11f, -0.02f, -0.17f), 0, 1);
     sim_bowl(s, 0.11f, clay, fruit, 3);

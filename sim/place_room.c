@@ -86,7 +86,7 @@ static void window(struct sim_scene *s, float w, float h, const struct shared *m
     }
     sim_box(s, v3(t, d - 0.05f, 0.62f * h), v3(w - t, d - 0.02f, 0.62f * h + 0.022f), 0.1f, m->white);
     sim_box(s, v3(-0.06f, -0.10f, -0.03f), v3(w + 0.06f, 0.02f, 0), 0.06f, m->white);
-    sim_scene_light(s, v3(t, d, t), v3(w - 2 * t, 0, 0), v3(0, 0, h - 2 * t));
+    sim_scene_light(s, v3(t, d, t), v3(w - 2 * t, 0, 0), v3(0, 0, h - 2 * t), 1.6f);
 }
 
 static void shell(struct sim_scene *s, const struct shared *m)
@@ -110,13 +110,13 @@ static void shell(struct sim_scene *s, const struct shared *m)
     /* Roof lights of frosted glass between the beams. */
     struct sim_material frosted;
     sim_material_init(&frosted);
-    frosted.emission = v3(3.2f, 3.3f, 3.4f);
+    frosted.emission = v3(0.93f, 0.96f, 0.98f);
     int glass = sim_scene_material(s, &frosted);
     const float roof[2][4] = {{-0.62f, 0.3f, 0.52f, 1.9f}, {0.82f, -2.3f, 1.9f, -0.7f}};
     for (int i = 0; i < 2; i++) {
         const float *r = roof[i], t = 0.04f;
         sim_quad(s, v3(r[0], r[3], Z1 - 0.01f), v3(r[2] - r[0], 0, 0), v3(0, r[1] - r[3], 0), GRID, glass);
-        sim_scene_light(s, v3(r[0], r[3], Z1 - 0.01f), v3(r[2] - r[0], 0, 0), v3(0, r[1] - r[3], 0));
+        sim_scene_light(s, v3(r[0], r[3], Z1 - 0.01f), v3(r[2] - r[0], 0, 0), v3(0, r[1] - r[3], 0), 3.4f);
         sim_box(s, v3(r[0] - t, r[1] - t, Z1 - 0.04f), v3(r[2] + t, r[1], Z1), 0.1f, m->white);
         sim_box(s, v3(r[0] - t, r[3], Z1 - 0.04f), v3(r[2] + t, r[3] + t, Z1), 0.1f, m->white);
         sim_box(s, v3(r[0] - t, r[1], Z1 - 0.04f), v3(r[0], r[3], Z1), 0.1f, m->white);
@@ -149,6 +149,7 @@ static void outside(struct sim_scene *s, const struct shared *m)
     int lawn = sim_pattern_material(s, SIM_GROUND, v3(0.10f, 0.20f, 0.05f), v3(0.16f, 0.24f, 0.07f),
                                     v3(0.22f, 0.20f, 0.10f), 1, 1, 0.25f, 30);
     int bark = sim_solid(s, v3(0.16f, 0.11f, 0.07f), 0.4f, 0, 0, 31);
+    int hedge = sim_solid(s, v3(0.07f, 0.15f, 0.05f), 0.35f, 0, 0, 33);
     int wall = sim_pattern_material(s, SIM_BRICK, v3(0.50f, 0.30f, 0.20f), v3(0.5f, 0.48f, 0.42f),
                                     v3(0.36f, 0.2f, 0.14f), 0.5f, 0.18f, 0.2f, 32);
 
@@ -156,11 +157,13 @@ static void outside(struct sim_scene *s, const struct shared *m)
     sim_quad(s, v3(X1 + 0.3f, -60, Z0 - 0.6f), v3(60, 0, 0), v3(0, 63, 0), 2.5f, lawn);
     sim_box(s, v3(-12, 17, Z0 - 0.6f), v3(30, 17.4f, Z0 + 0.9f), 0.5f, wall);
     sim_box(s, v3(22, -22, Z0 - 0.6f), v3(22.4f, 17, Z0 + 0.9f), 0.5f, wall);
+    sim_box(s, v3(-30, 20, Z0 - 0.6f), v3(40, 22, Z0 + 3.4f), 1, hedge);
+    sim_box(s, v3(25, -40, Z0 - 0.6f), v3(27, 22, Z0 + 3.8f), 1, hedge);
     const float trees[][3] = {{3.5f, 10, 4.4f}, {8, 14, 5.5f}, {-1, 15, 5},
                               {13, 3, 5},       {17, -4, 6},   {10.5f, -2.5f, 3.6f}};
     for (int i = 0; i < 6; i++) {
         sim_scene_place(s, v3(trees[i][0], trees[i][1], Z0 - 0.6f), 50.0f * (float)i, 1);
-        sim_tree(s, trees[i][2], 0.3f * trees[i][2], 1500, bark, m->leaf, 40u + (unsigned)i);
+        sim_tree(s, trees[i][2], 0.3f * trees[i][2], 4200, bark, m->leaf, 40u + (unsigned)i);
     }
     sim_scene_place(s, v3(0, 0, 0), 0, 1);
 }
@@ -187,7 +190,7 @@ static void near_table(struct sim_scene *s, const struct shared *m)
         for (int k = 0; k < 5; k++)
             sim_leaf(s, v3_mix(v3(0, 0, 0.28f), tip, 0.5f + 0.12f * (float)k),
                      v3(cosf(a + 2.1f * (float)k), sinf(a + 2.1f * (float)k), 0.5f), v3(0, 0, 1), 0.055f, 0.02f, 0.5f,
-                     m->leaf);
+                     5, m->leaf);
     }
     sim_scene_place(s, v3(-0.22f, y - 0.22f, top), 130, 1);
     sim_mug(s, mug);
@@ -303,7 +306,7 @@ static void wires(struct sim_scene *s, const struct shared *m)
     struct sim_material glow;
 
     sim_material_init(&glow);
-    glow.emission = v3(2.2f, 1.7f, 1.1f);
+    glow.emission = v3(1.0f, 0.78f, 0.5f);
     int lamp = sim_scene_material(s, &glow);
     for (int i = 0; i < 5; i++) {
         float y = -2.2f + 1.05f * (float)i;
@@ -318,7 +321,7 @@ static void wires(struct sim_scene *s, const struct shared *m)
     const float shade[][2] = {{0.17f, 0}, {0.15f, 0.07f}, {0.07f, 0.14f}, {0.02f, 0.16f}, {0.001f, 0.16f}};
     sim_lathe(s, v3(0.1f, -0.25f, 0.84f), shade, 5, 48, m->steel);
     sim_ball(s, v3(0.1f, -0.25f, 0.90f), 0.05f, 16, lamp);
-    sim_scene_light(s, v3(0.05f, -0.30f, 0.843f), v3(0.1f, 0, 0), v3(0, 0.1f, 0));
+    sim_scene_light(s, v3(0.05f, -0.30f, 0.843f), v3(0.1f, 0, 0), v3(0, 0.1f, 0), 2.2f);
     sim_wire(s, v3(-2.89f, -0.4f, 1.3f), v3(-2.89f, -0.35f, Z0 + 0.3f), 0, 0.003f, m->black);
 }
 
@@ -327,10 +330,11 @@ static void build(struct sim_scene *s)
     struct shared m;
 
     s->indoors = true;
-    s->sky = (struct sim_sky){.zenith = {0.55f, 0.85f, 1.5f},
-                              .horizon = {1.25f, 1.4f, 1.55f},
-                              .ground = {0.25f, 0.25f, 0.2f},
+    s->sky = (struct sim_sky){.zenith = {0.34f, 0.53f, 0.93f},
+                              .horizon = {0.78f, 0.87f, 0.96f},
+                              .ground = {0.16f, 0.16f, 0.13f},
                               .clouds = 0.4f,
+                              .cloud = 0.95f,
                               .sun_direction = v3_unit(v3(0.80f, 0.12f, 0.52f)),
                               .sun = {2.6f, 2.35f, 1.95f},
                               .sun_radius = 0.006f,

@@ -128,11 +128,11 @@ void sim_scene_triangle(struct sim_scene *scene, unsigned a, unsigned b, unsigne
     scene->triangle_material[scene->triangle_count++] = (unsigned char)material;
 }
 
-void sim_scene_light(struct sim_scene *scene, struct sim_v3 origin, struct sim_v3 u, struct sim_v3 v)
+void sim_scene_light(struct sim_scene *scene, struct sim_v3 origin, struct sim_v3 u, struct sim_v3 v, float gain)
 {
     assert(scene->light_count < SIM_LIGHTS);
     scene->lights[scene->light_count++] =
-        (struct sim_light){sim_scene_point(scene, origin), turn(&scene->frame, u), turn(&scene->frame, v)};
+        (struct sim_light){sim_scene_point(scene, origin), turn(&scene->frame, u), turn(&scene->frame, v), gain};
 }
 
 static int build_tree(struct sim_scene *scene, struct lumi_error *error)

@@ -18,14 +18,18 @@
 #define SIM_MATERIALS 200
 #define SIM_LIGHTS 6
 
-/* A rectangle origin + a u + b v, a and b in 0..1: an opening to the sky, or a shining thing. */
+/* A rectangle origin + a u + b v, a and b in 0..1: an opening to the sky, or a shining thing. It gives `gain` times the
+ * light it would give if it were as bright as it is seen: that way a window lights a room without burning out, as in a
+ * picture merged from brackets and tone-mapped. */
 struct sim_light {
     struct sim_v3 origin, u, v;
+    float gain;
 };
 
 struct sim_sky {
     struct sim_v3 zenith, horizon, ground; /* radiance */
     float clouds;                          /* 0..1: how much of it */
+    float cloud;                           /* radiance of a cloud */
     struct sim_v3 sun_direction;           /* towards it, unit */
     struct sim_v3 sun;                     /* irradiance over π on a surface that faces it; 0: none */
     float sun_radius;                      /* radians */
@@ -84,6 +88,6 @@ unsigned sim_scene_vertex(struct sim_scene *scene, struct sim_v3 position, struc
 void sim_scene_probe(struct sim_scene *scene, unsigned vertex, struct sim_v3 local);
 void sim_scene_triangle(struct sim_scene *scene, unsigned a, unsigned b, unsigned c, int material);
 struct sim_v3 sim_scene_point(const struct sim_scene *scene, struct sim_v3 local);
-void sim_scene_light(struct sim_scene *scene, struct sim_v3 origin, struct sim_v3 u, struct sim_v3 v);
+void sim_scene_light(struct sim_scene *scene, struct sim_v3 origin, struct sim_v3 u, struct sim_v3 v, float gain);
 
 #endif

@@ -69,7 +69,7 @@ struct sim_v3 sim_sky_radiance(const struct sim_sky *sky, struct sim_v3 d, float
         struct sim_octaves octaves = {1.6f, 0.62f, (spread + roughness) / (up * up), false, sky->seed};
         float n = sim_fractal(&octaves, v3(d.x / up, d.y / up, 0), NULL);
         float cover = sim_smooth(-0.2f, 1.5f, n + 2.2f * sky->clouds - 1.1f) * sim_smooth(0.01f, 0.25f, up);
-        c = v3_mix(c, v3_scale(v3(1, 0.98f, 0.96f), 1.15f + 0.12f * n), cover);
+        c = v3_mix(c, v3_scale(v3(1, 0.98f, 0.96f), sky->cloud * (1 + 0.1f * n)), cover);
     }
     if (sun && sky->sun.x > 0) {
         float radius = sky->sun_radius + roughness, cosine = v3_dot(d, sky->sun_direction);

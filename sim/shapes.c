@@ -179,24 +179,24 @@ void sim_lathe(struct sim_scene *scene, struct sim_v3 center, const float (*prof
 }
 
 void sim_leaf(struct sim_scene *scene, struct sim_v3 stem, struct sim_v3 along, struct sim_v3 up, float length,
-              float width, float droop, int material)
+              float width, float droop, int steps, int material)
 {
-    enum { STEPS = 5 };
     struct sim_v3 x = v3_unit(along), side = v3_unit(v3_cross(up, x)), z = v3_cross(x, side), p = stem;
     unsigned first = (unsigned)scene->vertex_count;
 
-    for (int j = 0; j <= STEPS; j++) {
-        float t = (float)j / STEPS, w = width * 0.5f * sinf(pi * powf(t, 0.75f)) + 0.0008f, bend = 1.6f * droop * t;
+    for (int j = 0; j <= steps; j++) {
+        float t = (float)j / (float)steps, w = width * 0.5f * sinf(pi * powf(t, 0.75f)) + 0.0008f,
+              bend = 1.6f * droop * t;
         struct sim_v3 dir = v3_add(v3_scale(x, cosf(bend)), v3_scale(z, -sinf(bend)));
         struct sim_v3 normal = v3_add(v3_scale(z, cosf(bend)), v3_scale(x, sinf(bend)));
         if (j)
-            p = v3_along(p, dir, length / STEPS);
+            p = v3_along(p, dir, length / (float)steps);
         for (int i = -1; i <= 1; i++) {
             struct sim_v3 q = v3_along(v3_along(p, side, (float)i * w), normal, i ? 0.12f * w : 0);
             sim_scene_vertex(scene, q, normal, v3(stem.x + t * length, stem.y + (float)i * w, stem.z));
         }
     }
-    stitch(scene, first, STEPS, 2, material);
+    stitch(scene, first, steps, 2, material);
 }
 
 void sim_curtain(struct sim_scene *scene, struct sim_v3 a, struct sim_v3 b, float height, int folds, float depth,

@@ -23,9 +23,10 @@ void sim_lump(struct sim_scene *scene, struct sim_v3 center, struct sim_v3 radii
 /* Turned on a lathe about the vertical through `center`: radius and height above it, from below, smooth. */
 void sim_lathe(struct sim_scene *scene, struct sim_v3 center, const float (*profile)[2], int count, int sides,
                int material);
-/* A leaf of this length and width, from its stem along `along`, its face towards `up`, bent down by `droop` (0..1). */
+/* A leaf of this length and width, from its stem along `along`, its face towards `up`, bent down by `droop` (0..1),
+ * in `steps` pieces. */
 void sim_leaf(struct sim_scene *scene, struct sim_v3 stem, struct sim_v3 along, struct sim_v3 up, float length,
-              float width, float droop, int material);
+              float width, float droop, int steps, int material);
 /* A curtain: from a to b (horizontal), hanging `height` down, in `folds` waves of depth `depth`. */
 void sim_curtain(struct sim_scene *scene, struct sim_v3 a, struct sim_v3 b, float height, int folds, float depth,
                  int material);

@@ -152,7 +152,7 @@ void sim_plant(struct sim_scene *s, int leaves, float size, int pot, int leaf, u
         struct sim_v3 tip = v3_along(stem, along, 0.45f * length);
         sim_bar(s, stem, tip, 0.0025f, 5, leaf);
         sim_leaf(s, tip, along, v3_sub(v3(0, 0, 1), v3_scale(out, 0.3f)), length, 0.22f * length,
-                 0.5f + 0.6f * sim_hash(i, 3, seed), leaf);
+                 0.5f + 0.6f * sim_hash(i, 3, seed), 5, leaf);
     }
 }
 
@@ -281,7 +281,7 @@ void sim_tree(struct sim_scene *s, float height, float crown, int leaves, int ba
             struct sim_v3 at = v3_along(tip, v3(c * cosf(a), c * sinf(a), 0.8f * b), q);
             struct sim_v3 along = v3(cosf(7 * a), sinf(7 * a), 0.6f * sim_hash(n, 6, seed) - 0.5f);
             float size = 0.02f * height + 0.07f + 0.08f * sim_hash(n, 7, seed);
-            sim_leaf(s, at, along, v3(0.5f * sinf(5 * a), 0.5f * cosf(3 * a), 1), size, 0.5f * size, 0.4f, leaf);
+            sim_leaf(s, at, along, v3(0.5f * sinf(5 * a), 0.5f * cosf(3 * a), 1), size, 0.5f * size, 0.4f, 2, leaf);
         }
     }
 }
