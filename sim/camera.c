@@ -7,12 +7,14 @@
 #include <string.h>
 
 #define TILE 32
-#define COARSE 2 /* rays a side of a pixel, everywhere */
-#define FINE 4   /* and where the coarse ones differ */
+#define RIM (TILE + 2) /* a tile and the pixels around it */
+#define COARSE 2       /* rays a side of a pixel, everywhere */
+#define FINE 4         /* and where the coarse ones differ */
 
-/* Coarse rays differ when a channel's brightest and darkest, as the eye sees them (about a square root), are further
- * apart than this. */
-#define CONTRAST 0.035f
+/* Rays differ when a channel's brightest and darkest, as the eye sees them (about a square root), are further apart
+ * than this: the rays of a pixel, and those of a pixel and its neighbours, between which an edge may pass unseen. */
+#define CONTRAST 0.05f
+#define CONTRAST_AROUND 0.15f
 
 struct job {
     const struct sim_scene *scene;
@@ -22,23 +24,36 @@ struct job {
     int columns; /* of tiles */
 };
 
-/* Directions (world) at the corners of a tile's pixels; between them they are linear to 1e-4 of a pixel. */
+/* Directions (world) at the corners of the pixels of a tile and around it; between them they are linear to 1e-4 of a
+ * pixel. Pixel (0, 0) is the one left of and above the tile. */
 struct corners {
-    struct sim_v3 direction[TILE + 1][TILE + 1];
-    bool imaged[TILE + 1][TILE + 1];
+    struct sim_v3 direction[RIM + 1][RIM + 1];
+    bool imaged[RIM + 1][RIM + 1];
 };
 
 static void find_corners(const struct job *job, int x0, int y0, int width, int height, struct corners *corners)
 {
-    for (int j = 0; j <= height; j++)
-        for (int i = 0; i <= width; i++) {
+    for (int j = 0; j <= height + 2; j++)
+        for (int i = 0; i <= width + 2; i++) {
             struct lumi_vec3 d = {0};
-            corners->imaged[j][i] = lumi_lens_unproject(job->lens, x0 + i, y0 + j, &d);
+            corners->imaged[j][i] = lumi_lens_unproject(job->lens, x0 + i - 1, y0 + j - 1, &d);
             corners->direction[j][i] = v3_of(lumi_rotate(job->pose->r, d));
         }
 }
 
-/* The ray through (a, b) in 0..1 of the pixel (i, j) of the tile. */
+static bool imaged(const struct corners *c, int i, int j)
+{
+    return c->imaged[j][i] && c->imaged[j][i + 1] && c->imaged[j + 1][i] && c->imaged[j + 1][i + 1];
+}
+
+/* Where along an axis of the pixel, 0..1 from edge to edge, share u of its response lies: a tent a pixel wide to either
+ * side, a square pixel behind a lens that blurs as much again. */
+static float tent(float u)
+{
+    return u < 0.5f ? sqrtf(2 * u) - 0.5f : 1.5f - sqrtf(2 - 2 * u);
+}
+
+/* The ray through (a, b) of the pixel (i, j). */
 static void pixel_ray(const struct job *job, const struct corners *c, int i, int j, float a, float b,
                       struct sim_ray *ray)
 {
@@ -70,23 +85,42 @@ static struct range sample_pixel(const struct job *job, const struct corners *co
     struct range range = {v3_grey(0), v3_grey(INFINITY), v3_grey(0)};
     struct sim_ray ray;
     struct sim_hit hit;
+    const float n = (float)(side * side);
 
     for (int k = 0; k < side * side; k++) {
-        float a = ((float)(k % side) + 0.5f) / (float)side, b = ((float)(k / side) + 0.5f) / (float)side;
-        pixel_ray(job, corners, i, j, a, b, &ray);
+        /* Each in its cell of side × side, and alone in its row and column of n × n. */
+        int column = k % side, row = k / side;
+        float a = (float)(column * side + row) + 0.5f, b = (float)(row * side + column) + 0.5f;
+        pixel_ray(job, corners, i, j, tent(a / n), tent(b / n), &ray);
         sim_trace(job->scene, &ray, 1e-3f, &hit);
         int sun = side == FINE ? k * 7 % SIM_SUN_POINTS : rim[k];
         struct sim_v3 c = sim_shade(job->scene, &ray, &hit, sun);
         take(&range, c);
     }
-    range.sum = v3_scale(range.sum, 1 / (float)(side * side));
+    range.sum = v3_scale(range.sum, 1 / n);
     return range;
 }
 
-static bool differs(const struct range *r)
+static float spread(struct sim_v3 low, struct sim_v3 high)
 {
-    return sqrtf(r->high.x) - sqrtf(r->low.x) > CONTRAST || sqrtf(r->high.y) - sqrtf(r->low.y) > CONTRAST ||
-           sqrtf(r->high.z) - sqrtf(r->low.z) > CONTRAST;
+    float red = sqrtf(high.x) - sqrtf(low.x), green = sqrtf(high.y) - sqrtf(low.y), blue = sqrtf(high.z) - sqrtf(low.z);
+
+    return fmaxf(red, fmaxf(green, blue));
+}
+
+/* Does the pixel (i, j), or what lies between it and its neighbours, want more rays? */
+static bool differs(const struct range ranges[RIM][RIM], int i, int j)
+{
+    struct range all = ranges[j][i];
+
+    if (spread(all.low, all.high) > CONTRAST)
+        return true;
+    for (int dj = -1; dj <= 1; dj++)
+        for (int di = -1; di <= 1; di++) {
+            take(&all, ranges[j + dj][i + di].low);
+            take(&all, ranges[j + dj][i + di].high);
+        }
+    return spread(all.low, all.high) > CONTRAST_AROUND;
 }
 
 static float pixel_depth(const struct job *job, int x, int y)
@@ -101,31 +135,42 @@ static float pixel_depth(const struct job *job, int x, int y)
     return hit.triangle < 0 ? INFINITY : hit.distance * (float)d.z;
 }
 
+/* The coarse rays of a tile and of the pixels around it; what is not imaged has the range of nothing. */
+static void render_coarse(const struct job *job, const struct corners *corners, int width, int height,
+                          struct range ranges[RIM][RIM])
+{
+    for (int j = 0; j < height + 2; j++)
+        for (int i = 0; i < width + 2; i++)
+            ranges[j][i] = imaged(corners, i, j) ? sample_pixel(job, corners, i, j, COARSE)
+                                                 : (struct range){v3_grey(0), v3_grey(INFINITY), v3_grey(0)};
+}
+
 static int render_tile(void *context, int index, int thread)
 {
     const struct job *job = context;
     int x0 = index % job->columns * TILE, y0 = index / job->columns * TILE;
     int width = job->lens->width - x0, height = job->lens->height - y0;
     struct corners corners;
+    struct range ranges[RIM][RIM];
 
     (void)thread;
     width = width < TILE ? width : TILE;
     height = height < TILE ? height : TILE;
     find_corners(job, x0, y0, width, height, &corners);
+    render_coarse(job, &corners, width, height, ranges);
     for (int j = 0; j < height; j++)
         for (int i = 0; i < width; i++) {
             if (job->depth)
                 lumi_row_f32(job->depth, y0 + j)[x0 + i] = pixel_depth(job, x0 + i, y0 + j);
-            if (!corners.imaged[j][i] || !corners.imaged[j][i + 1] || !corners.imaged[j + 1][i] ||
-                !corners.imaged[j + 1][i + 1])
+            if (!imaged(&corners, i + 1, j + 1))
                 continue;
-            struct range range = sample_pixel(job, &corners, i, j, COARSE);
-            if (differs(&range))
-                range = sample_pixel(job, &corners, i, j, FINE);
+            struct sim_v3 sum = ranges[j + 1][i + 1].sum;
+            if (differs(ranges, i + 1, j + 1))
+                sum = sample_pixel(job, &corners, i + 1, j + 1, FINE).sum;
             float *to = lumi_row_f32(job->color, y0 + j) + 3 * (size_t)(x0 + i);
-            to[0] = range.sum.x;
-            to[1] = range.sum.y;
-            to[2] = range.sum.z;
+            to[0] = sum.x;
+            to[1] = sum.y;
+            to[2] = sum.z;
         }
     return LUMI_OK;
 }
