@@ -2,6 +2,8 @@
 #include "pipeline/compress/compress.h"
 
 #include "pipeline/compress/level.h"
+#include "pipeline/compress/sample.h"
+#include "pipeline/compress/size_search.h"
 #include "pipeline/geometry/disks.h"
 #include "pipeline/run/key.h"
 #include "proto/base/file.h"
@@ -165,29 +167,34 @@ static int file_size(const char *path, long long *size, struct lumi_error *error
     return LUMI_OK;
 }
 
-/* The size of the field at a quality; once known, it is kept in a file, so that a search that was stopped need not code
- * everything again. *written: whether the field now lies at `path`. */
-static int size_at(struct lumi_run *run, int quality, const char *path, long long *size, bool *written,
-                   struct lumi_error *error)
+/* A search for a size. */
+struct search {
+    struct lumi_run *run;
+    const char *path; /* where fields are written */
+    int at_path;      /* the quality of the one that lies there; −1: none */
+};
+
+typedef int (*size_fn)(struct search *search, int quality, long long *size, struct lumi_error *error);
+
+/* A size at a quality; once known, it is kept in a file, so that a search that was stopped need not code again. */
+static int size_kept(struct search *search, const char *kind, size_fn find, int quality, long long *size,
+                     struct lumi_error *error)
 {
-    g_autofree char *all = lumi_run_path(run, "compress", -1, ""), *folder = g_path_get_dirname(all);
-    g_autofree char *kept = g_strdup_printf("%s/size-%03d.txt", folder, quality);
-    g_autofree char *kept_key = g_strdup_printf("%s/size-%03d.key", folder, quality), *text = NULL;
+    g_autofree char *all = lumi_run_path(search->run, "compress", -1, ""), *folder = g_path_get_dirname(all);
+    g_autofree char *kept = g_strdup_printf("%s/%s-%03d.txt", folder, kind, quality);
+    g_autofree char *kept_key = g_strdup_printf("%s/%s-%03d.key", folder, kind, quality), *text = NULL;
     char hex[LUMI_KEY_HEX], there[LUMI_KEY_HEX];
     struct lumi_key k;
 
-    lumi_key_init(&k, "compress-size", lumi_stage_compress.version);
+    lumi_key_init(&k, kind, lumi_stage_compress.version);
     lumi_key_int(&k, quality);
-    key_content(run, &k);
+    key_content(search->run, &k);
     lumi_key_hex(&k, hex);
-    *written = false;
     if (lumi_key_load(kept_key, there) && !strcmp(there, hex) && g_file_get_contents(kept, &text, NULL, NULL)) {
         *size = g_ascii_strtoll(text, NULL, 10);
         return LUMI_OK;
     }
-    LUMI_TRY(write_at(run, quality, path, error));
-    *written = true;
-    LUMI_TRY(file_size(path, size, error));
+    LUMI_TRY(find(search, quality, size, error));
     text = g_strdup_printf("%lld\n", *size);
     if (g_unlink(kept_key) && errno != ENOENT)
         return lumi_fail_errno(error, kept_key, "remove");
@@ -195,29 +202,57 @@ static int size_at(struct lumi_run *run, int quality, const char *path, long lon
     return lumi_key_save(kept_key, kept, hex, error);
 }
 
-/* The highest quality whose file is no larger than `target`: bisection, since larger quality makes larger files. */
+static int code_all(struct search *search, int quality, long long *size, struct lumi_error *error)
+{
+    LUMI_TRY(write_at(search->run, quality, search->path, error));
+    search->at_path = quality;
+    return file_size(search->path, size, error);
+}
+
+static int code_sample(struct search *search, int quality, long long *size, struct lumi_error *error)
+{
+    return compress_sample_size(search->run, quality, size, error);
+}
+
+/* Neighbouring qualities may mean the same quantizers: the lowest of them. */
+static int lowest_alike(int quality)
+{
+    struct compress_quality wanted, lower;
+
+    compress_quality_init(&wanted, quality);
+    for (; quality > 0; quality--) {
+        compress_quality_init(&lower, quality - 1);
+        if (lower.tile_quantizer != wanted.tile_quantizer)
+            break;
+    }
+    return quality;
+}
+
+static int measure(void *context, int quality, long long *size, struct lumi_error *error)
+{
+    return size_kept(context, "size", code_all, lowest_alike(quality), size, error);
+}
+
+static int estimate(void *context, int quality, long long *size, struct lumi_error *error)
+{
+    return size_kept(context, "sample", code_sample, lowest_alike(quality), size, error);
+}
+
 static int write_within(struct lumi_run *run, long long target, const char *path, struct lumi_error *error)
 {
-    int low = 0, high = 100, at_path = -1;
+    bool sample = compress_sample_pays(run->count, run->parameters.cluster_size);
+    struct search search = {run, path, -1};
     long long size = 0;
-    bool written;
+    int quality;
 
-    while (low < high) {
-        int middle = (low + high + 1) / 2;
-        LUMI_TRY(size_at(run, middle, path, &size, &written, error));
-        at_path = written ? middle : at_path;
-        if (size <= target)
-            low = middle;
-        else
-            high = middle - 1;
-    }
-    if (at_path != low)
-        LUMI_TRY(write_at(run, low, path, error));
-    LUMI_TRY(file_size(path, &size, error));
-    if (size > target)
+    LUMI_TRY(compress_size_search(target, sample ? estimate : NULL, measure, &search, &quality, error));
+    if (quality < 0) {
+        LUMI_TRY(measure(&search, 0, &size, error));
         return lumi_fail(error, LUMI_ERR_LIMIT,
                          "the smallest field of this capture has %lld bytes, %lld were asked for", size, target);
-    return LUMI_OK;
+    }
+    quality = lowest_alike(quality);
+    return search.at_path == quality ? LUMI_OK : write_at(run, quality, path, error);
 }
 
 static int make(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error)

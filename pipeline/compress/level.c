@@ -10,6 +10,7 @@
 
 #include <errno.h>
 #include <glib.h>
+#include <glib/gstdio.h>
 #include <pthread.h>
 #include <string.h>
 #include <unistd.h>
@@ -82,8 +83,8 @@ static char *piece_path(const struct compress_level *level, const char *kind, in
     g_autofree char *all = lumi_run_path(level->run, "compress", -1, "");
     g_autofree char *folder = g_path_get_dirname(all);
 
-    return g_strdup_printf("%s/%s-%s-%04d%s", folder, level->index == LUMI_LEVEL_COARSE ? "coarse" : "fine", kind,
-                           number, extension);
+    return g_strdup_printf("%s/%s%s-%s-%04d%s", folder, level->sample ? "sample-" : "",
+                           level->index == LUMI_LEVEL_COARSE ? "coarse" : "fine", kind, number, extension);
 }
 
 static int reference_view(const struct compress_level *level, int cluster)
@@ -238,6 +239,29 @@ int compress_level_cluster(const struct compress_level *level, int cluster, stru
     return LUMI_OK;
 }
 
+static int piece_bytes(const struct compress_level *level, const char *kind, int number, double *bytes,
+                       struct lumi_error *error)
+{
+    g_autofree char *path = piece_path(level, kind, number, ".bin");
+    GStatBuf status;
+
+    if (g_stat(path, &status))
+        return lumi_fail_errno(error, path, "examine");
+    *bytes += (double)status.st_size;
+    return LUMI_OK;
+}
+
+int compress_level_bytes(const struct compress_level *level, double *references, double *clusters,
+                         struct lumi_error *error)
+{
+    *references = *clusters = 0;
+    for (int i = 0; i < run_count(level); i++)
+        LUMI_TRY(piece_bytes(level, "references", i, references, error));
+    for (int i = 0; i < level->clusters.count; i++)
+        LUMI_TRY(piece_bytes(level, "cluster", i, clusters, error));
+    return LUMI_OK;
+}
+
 /* The work of several threads, whose first error (by item) counts. */
 struct work {
     struct compress_level *level;
@@ -312,8 +336,9 @@ static int run_item(void *context, int run, int thread)
 static int train(struct compress_level *level, struct lumi_error *error)
 {
     const struct lumi_clusters *clusters = &level->clusters;
-    int coded = level->count - clusters->count, images = MIN(coded, LUMI_TRAINING_IMAGES), code = LUMI_OK;
-    int wanted = lumi_training_count((long)coded * level->grid.cols * level->grid.rows);
+    int coded = clusters->first[clusters->count] - clusters->count, images = MIN(coded, LUMI_TRAINING_IMAGES);
+    long all = level->count - (level->sample ? 0 : clusters->count); /* a sample is trained as the whole is */
+    int wanted = coded ? lumi_training_count(all * level->grid.cols * level->grid.rows) : 0, code = LUMI_OK;
 
     level->training = lumi_alloc((size_t)wanted + 1, sizeof *level->training);
     if (!level->training)

@@ -26,6 +26,7 @@ struct compress_level {
     struct lumi_grid grid;
     struct lumi_warp *half; /* from the run's grid to the coarse one; NULL for the fine level */
     struct lumi_clusters clusters;
+    bool sample;                 /* `clusters` are some only, with some of their views; their pieces are kept apart */
     struct lumi_yuv *references; /* as decoded, a cluster each */
     struct lumi_training_tile *training;
     int training_count;
@@ -40,6 +41,10 @@ void compress_level_finish(struct compress_level *level);
 
 /* Codes what is not there yet: reference images, then clusters. */
 int compress_level_code(struct compress_level *level, struct lumi_error *error);
+
+/* The bytes of what compress_level_code has made. */
+int compress_level_bytes(const struct compress_level *level, double *references, double *clusters,
+                         struct lumi_error *error);
 
 /* The pieces, as struct lumi_field_content asks for them. */
 int compress_level_references(const struct compress_level *level, int run_index, uint32_t *sizes,

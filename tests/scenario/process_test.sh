@@ -79,6 +79,8 @@ target=$(($(size one.lumi) * 3 / 4))
 "$lumi" process a -o t.lumi $options --target-bytes $target >/dev/null || fail "--target-bytes"
 [ "$(size t.lumi)" -le $target ] || fail "--target-bytes $target gives $(size t.lumi)"
 at_least "$(size t.lumi)" $((target * 9 / 10)) "--target-bytes $target"
+codings=$(find a.work/compress -name 'size-*.txt' | wc -l)
+[ "$codings" -le 4 ] || fail "--target-bytes coded the whole $codings times"
 cp t.lumi t1.lumi
 rm a.work/compress/all.*
 before=$(ls -i a.work/compress/size-*.txt)
