@@ -10,59 +10,71 @@ static uint8_t clamp_byte(int value)
     return (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
 }
 
-/* Colours, averaged over divisor × divisor pixels. */
-static void pack_colours(const struct lumi_raster *source, int divisor, int width, int height, uint32_t *pixels)
+/* A row of colours, averaged over divisor × divisor pixels. */
+static void pack_colours(const struct lumi_raster *source, int divisor, int y, int width, uint32_t *pixels)
 {
-    for (int y = 0; y < height; y++)
-        for (int x = 0; x < width; x++) {
-            unsigned sum[3] = {0}, area = (unsigned)(divisor * divisor);
-            for (int j = 0; j < divisor; j++) {
-                const uint8_t *row = lumi_row_u8(source, y * divisor + j) + 3 * x * divisor;
-                for (int i = 0; i < divisor; i++)
-                    for (int c = 0; c < 3; c++)
-                        sum[c] += row[3 * i + c];
-            }
-            uint32_t packed = 0;
-            for (int c = 0; c < 3; c++)
-                packed |= (sum[c] + area / 2) / area << 8 * c;
-            pixels[(size_t)y * (size_t)width + (size_t)x] = packed;
-        }
-}
+    const unsigned area = (unsigned)(divisor * divisor);
 
-static int luma(uint32_t pixel)
-{
-    return (int)(((pixel & 255) + 2 * (pixel >> 8 & 255) + (pixel >> 16 & 255) + 2) >> 2);
-}
-
-/* Sums over five places, with the border repeated. */
-static void blur_line(const int *source, int count, int step, int *result)
-{
-    for (int i = 0; i < count; i++) {
-        int sum = 0;
-        for (int j = i - 2; j <= i + 2; j++)
-            sum += source[(j < 0 ? 0 : j >= count ? count - 1 : j) * step];
-        result[i * step] = sum;
+    if (divisor == 1) {
+        const uint8_t *row = lumi_row_u8(source, y);
+        for (int x = 0; x < width; x++)
+            pixels[x] = row[3 * x] | (uint32_t)row[3 * x + 1] << 8 | (uint32_t)row[3 * x + 2] << 16;
+        return;
     }
+    for (int x = 0; x < width; x++) {
+        unsigned sum[3] = {0};
+        for (int j = 0; j < divisor; j++) {
+            const uint8_t *row = lumi_row_u8(source, y * divisor + j) + 3 * x * divisor;
+            for (int i = 0; i < divisor; i++)
+                for (int c = 0; c < 3; c++)
+                    sum[c] += row[3 * i + c];
+        }
+        pixels[x] = (sum[0] + area / 2) / area | (sum[1] + area / 2) / area << 8 | (sum[2] + area / 2) / area << 16;
+    }
+}
+
+static uint16_t luma(uint32_t pixel)
+{
+    return (uint16_t)(((pixel & 255) + 2 * (pixel >> 8 & 255) + (pixel >> 16 & 255) + 2) >> 2);
+}
+
+/* Sums of brightness over five pixels of a row, with the border repeated. `bright`: width + 4 elements. */
+static void blur_row(const uint32_t *pixels, int width, uint16_t *bright, uint16_t *sums)
+{
+    for (int x = 0; x < width; x++)
+        bright[x + 2] = luma(pixels[x]);
+    bright[0] = bright[1] = bright[2];
+    bright[width + 2] = bright[width + 3] = bright[width + 1];
+    for (int x = 0; x < width; x++)
+        sums[x] = (uint16_t)(bright[x] + bright[x + 1] + bright[x + 2] + bright[x + 3] + bright[x + 4]);
 }
 
 /* Local contrast, brightness over its mean in 5×5 pixels, in the fourth byte: what a change of exposure or a soft
  * highlight leaves as it is. */
 static int pack_contrast(int width, int height, uint32_t *pixels)
 {
-    const size_t count = (size_t)width * (size_t)height;
-    int *bright = lumi_alloc(count, 3 * sizeof(int)), *rows = bright + count, *both = rows + count;
+    enum { ROWS = 5 };
+    const size_t line = (size_t)width;
+    uint16_t *sums = lumi_alloc((ROWS + 1) * line + 4, sizeof(uint16_t)), *bright = sums + ROWS * line;
 
-    if (!bright)
+    if (!sums)
         return LUMI_ERR_NOMEM;
-    for (size_t i = 0; i < count; i++)
-        bright[i] = luma(pixels[i]);
-    for (int y = 0; y < height; y++)
-        blur_line(bright + (size_t)y * (size_t)width, width, 1, rows + (size_t)y * (size_t)width);
-    for (int x = 0; x < width; x++)
-        blur_line(rows + x, height, width, both + x);
-    for (size_t i = 0; i < count; i++)
-        pixels[i] |= (uint32_t)clamp_byte(128 + (25 * bright[i] - both[i]) / 25) << 24;
-    lumi_free(bright);
+    for (int y = -2; y < height; y++) {
+        /* sums: of row r at r % 5, of all within two rows of y */
+        for (int r = y == -2 ? 0 : y + 2; r <= y + 2 && r < height; r++)
+            blur_row(pixels + (size_t)r * line, width, bright, sums + (size_t)(r % ROWS) * line);
+        const uint16_t *around[ROWS];
+        for (int j = 0; j < ROWS; j++) {
+            const int r = y + j - 2;
+            around[j] = sums + (size_t)((r < 0 ? 0 : r < height ? r : height - 1) % ROWS) * line;
+        }
+        uint32_t *row = pixels + (size_t)(y < 0 ? 0 : y) * line;
+        for (int x = 0; y >= 0 && x < width; x++) {
+            int mean = around[0][x] + around[1][x] + around[2][x] + around[3][x] + around[4][x];
+            row[x] |= (uint32_t)clamp_byte(128 + (25 * luma(row[x]) - mean) / 25) << 24;
+        }
+    }
+    lumi_free(sums);
     return LUMI_OK;
 }
 
@@ -73,7 +85,8 @@ static int image_pixels(const struct lumi_mvs_view *view, int divisor, int *widt
     *pixels = lumi_alloc((size_t)*width * (size_t)*height, sizeof(uint32_t));
     if (!*pixels)
         return LUMI_ERR_NOMEM;
-    pack_colours(&view->image, divisor, *width, *height, *pixels);
+    for (int y = 0; y < *height; y++)
+        pack_colours(&view->image, divisor, y, *width, *pixels + (size_t)y * (size_t)*width);
     return pack_contrast(*width, *height, *pixels);
 }
 
@@ -107,29 +120,57 @@ void mvs_image_finish(struct mvs_image *image)
 }
 
 /* Half-way between b and c by cubic interpolation, byte by byte. */
-static uint32_t between(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
+static void between(const uint8_t *a, const uint8_t *b, const uint8_t *c, const uint8_t *d, size_t count,
+                    uint8_t *restrict result)
 {
-    uint32_t result = 0;
-
-    for (int shift = 0; shift < 32; shift += 8) {
-        int outer = (int)(a >> shift & 255) + (int)(d >> shift & 255);
-        int inner = (int)(b >> shift & 255) + (int)(c >> shift & 255);
-        result |= (uint32_t)clamp_byte((9 * inner - outer + 8) >> 4) << shift;
+    for (size_t i = 0; i < count; i++) {
+        int value = (9 * (b[i] + c[i]) - (a[i] + d[i]) + 8) >> 4;
+        value = value < 0 ? 0 : value;
+        result[i] = (uint8_t)(value < 255 ? value : 255);
     }
-    return result;
 }
 
-static void double_line(const uint32_t *source, int count, size_t step, uint32_t *result, size_t result_step)
+/* A row at twice the density; `line` has room for `width` + 3 pixels, `middle` for `width`. */
+static void double_row(const uint32_t *pixels, int width, uint32_t *line, uint32_t *middle, uint32_t *result)
 {
-    for (int i = 0; i < count; i++) {
-        const uint32_t *at = source + (size_t)i * step;
-        result[2 * (size_t)i * result_step] = *at;
-        if (i + 1 < count) {
-            uint32_t before = i > 0 ? *(at - step) : *at, next = at[step];
-            uint32_t after = i + 2 < count ? at[2 * step] : next;
-            result[(2 * (size_t)i + 1) * result_step] = between(before, *at, next, after);
-        }
+    const size_t pixel = sizeof(*pixels), last = (size_t)width - 1;
+    const uint8_t *bytes = (const uint8_t *)line;
+
+    memcpy(line + 1, pixels, (size_t)width * pixel);
+    line[0] = pixels[0];
+    line[width + 1] = line[width + 2] = pixels[last];
+    between(bytes, bytes + pixel, bytes + 2 * pixel, bytes + 3 * pixel, last * pixel, (uint8_t *)middle);
+    for (size_t x = 0; x < last; x++) {
+        result[2 * x] = pixels[x];
+        result[2 * x + 1] = middle[x];
     }
+    result[2 * last] = pixels[last];
+}
+
+/* `pixels` at twice the density. */
+static int double_pixels(struct mvs_target *target, const uint32_t *pixels, int width, int height)
+{
+    const size_t wide = 2 * (size_t)width - 1;
+    uint32_t *line = lumi_alloc(2 * (size_t)width + 3, sizeof(uint32_t));
+
+    target->width = 2 * width - 1;
+    target->height = 2 * height - 1;
+    target->pixels = lumi_alloc(wide * (size_t)target->height, sizeof(uint32_t));
+    if (!line || !target->pixels) {
+        lumi_free(line);
+        return LUMI_ERR_NOMEM;
+    }
+    for (int y = 0; y < height; y++)
+        double_row(pixels + (size_t)y * (size_t)width, width, line, line + width + 3,
+                   target->pixels + 2 * (size_t)y * wide);
+    for (int y = 0; y + 1 < height; y++) {
+        const uint32_t *at = target->pixels + 2 * (size_t)y * wide;
+        const uint32_t *before = y > 0 ? at - 2 * wide : at, *after = y + 2 < height ? at + 4 * wide : at + 2 * wide;
+        between((const uint8_t *)before, (const uint8_t *)at, (const uint8_t *)(at + 2 * wide), (const uint8_t *)after,
+                wide * sizeof(uint32_t), (uint8_t *)(target->pixels + (2 * (size_t)y + 1) * wide));
+    }
+    lumi_free(line);
+    return LUMI_OK;
 }
 
 /* The table of one axis: exact at the cells' ends, which lie closer together than pixels do. */
@@ -169,21 +210,11 @@ int mvs_target_init(struct mvs_target *target, const struct lumi_mvs_view *view,
                     int divisor)
 {
     uint32_t *pixels = NULL;
-    int width, height, code = LUMI_ERR_NOMEM;
+    int width, height, code;
 
     memset(target, 0, sizeof(*target));
     LUMI_GOTO(code, done, image_pixels(neighbour, divisor, &width, &height, &pixels));
-    target->width = 2 * width - 1;
-    target->height = 2 * height - 1;
-    target->pixels = lumi_alloc((size_t)target->width * (size_t)target->height, sizeof(uint32_t));
-    code = LUMI_ERR_NOMEM;
-    if (!target->pixels)
-        goto done;
-    for (int y = 0; y < height; y++)
-        double_line(pixels + (size_t)y * (size_t)width, width, 1,
-                    target->pixels + 2 * (size_t)y * (size_t)target->width, 1);
-    for (int x = 0; x < target->width; x++)
-        double_line(target->pixels + x, height, 2 * (size_t)target->width, target->pixels + x, (size_t)target->width);
+    LUMI_GOTO(code, done, double_pixels(target, pixels, width, height));
     const struct lumi_grid *grid = neighbour->grid;
     init_axis(&target->x, grid->tan_x, grid->cols, divisor);
     init_axis(&target->y, grid->tan_y, grid->rows, divisor);
@@ -204,14 +235,4 @@ void mvs_target_finish(struct mvs_target *target)
 {
     lumi_free(target->pixels);
     target->pixels = NULL;
-}
-
-void mvs_target_planes(struct mvs_target *target, int planes, float w_first, float w_step)
-{
-    for (int k = 0; k < planes; k++) {
-        float w = w_first + (float)k * w_step;
-        target->plane_x[k] = w * target->shift[0];
-        target->plane_y[k] = w * target->shift[1];
-        target->plane_z[k] = w * target->shift[2];
-    }
 }

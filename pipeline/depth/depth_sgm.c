@@ -1,6 +1,7 @@
 /* Semi-global matching (Hirschmüller 2008, "Stereo processing by semiglobal matching and mutual information"): eight
  * paths, the penalty of a jump lower where the colour jumps. The image is worked in bands that overlap, so that the
- * sums need little memory and threads have something to share. */
+ * sums need little memory and threads have something to share. Pixels search the planes of their block only; on a path
+ * from one block to the next, what the other did not search is reached by a jump. */
 #include "pipeline/depth/mvs_priv.h"
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
@@ -8,25 +9,34 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BAND_ROWS = 128, BAND_OVERLAP = 32, PAD = 16 };
+enum { BAND_BLOCKS = 8, OVERLAP_BLOCKS = 2, PAD = 16 };
+enum { STEP_PENALTY = 4, JUMP_LOW = 12, JUMP_HIGH = 60, JUMP_SLOPE = 2 };
 
 struct sgm_job {
     const struct mvs_image *image;
     const struct mvs_kernels *kernels;
+    const struct mvs_search *search;
     const uint8_t *volume;
-    int planes;
-    float *result;
+    float *planes;
 };
 
-/* The three paths that come from the row before, and the one along the row. lines[d][x] with PAD before and after. */
+/* A block and what its steps need. */
+struct place {
+    const struct mvs_block *block;
+    uint8_t below[MVS_PLANES_MAX], above[MVS_PLANES_MAX];
+};
+
+/* The three paths that come from the row before, and the one along the row. `before` and `now`: a row's pixels side by
+ * side, `lanes` each. lowest: a pixel. */
 struct sgm_scratch {
-    int16_t *before[3], *now[3], *along[2];
-    int *lowest_before[3], *lowest_now[3];
-    uint16_t *sum;
-    void *block, *lowest_block;
+    uint8_t *before[3], *now[3], *along[2];
+    uint8_t *lowest_before[3], *lowest_now[3];
+    uint8_t moved[MVS_PATHS][MVS_PLANES_MAX + 2 * PAD]; /* of a block with other planes, in this one's order */
+    uint8_t nothing[MVS_PLANES_MAX + 2 * PAD];          /* where a path begins */
+    uint16_t *sum;                                      /* of the band */
+    size_t begin;                                       /* where in a volume the band begins */
+    uint8_t *bytes;
 };
-
-static int p1_of = 4, p2_low = 12, p2_high = 60, p2_slope = 2;
 
 static int jump_penalty(uint32_t a, uint32_t b)
 {
@@ -36,84 +46,142 @@ static int jump_penalty(uint32_t a, uint32_t b)
         int difference = abs((int)(a >> shift & 255) - (int)(b >> shift & 255));
         largest = difference > largest ? difference : largest;
     }
-    int penalty = p2_high - p2_slope * largest;
-    return penalty > p2_low ? penalty : p2_low;
+    int penalty = JUMP_HIGH - JUMP_SLOPE * largest;
+    return penalty > JUMP_LOW ? penalty : JUMP_LOW;
 }
 
-static int scratch_init(struct sgm_scratch *scratch, int width, int rows, int planes)
+static int scratch_init(struct sgm_scratch *s, const struct mvs_search *search, int width, size_t begin, size_t end)
 {
-    const size_t line = (size_t)planes + 2 * PAD, lines = line * (size_t)width;
+    const size_t line = (size_t)search->widest * MVS_BLOCK + 2 * PAD, pixels = (size_t)width;
 
-    memset(scratch, 0, sizeof(*scratch));
-    scratch->block = lumi_alloc(6 * lines + 2 * line, sizeof(int16_t));
-    scratch->lowest_block = lumi_alloc(6 * (size_t)width, sizeof(int));
-    scratch->sum = lumi_calloc((size_t)rows * (size_t)width * (size_t)planes, sizeof(uint16_t));
-    if (!scratch->block || !scratch->lowest_block || !scratch->sum)
+    memset(s, 0, sizeof(*s));
+    s->begin = begin;
+    s->bytes = lumi_calloc(6 * (line + pixels) + 2 * (MVS_PLANES_MAX + 2 * PAD), 1);
+    s->sum = lumi_alloc(end - begin, sizeof(uint16_t));
+    if (!s->bytes || !s->sum)
         return LUMI_ERR_NOMEM;
-    int16_t *at = (int16_t *)scratch->block + PAD;
+    uint8_t *at = s->bytes;
     for (int d = 0; d < 3; d++) {
-        scratch->before[d] = at + (size_t)(2 * d) * lines;
-        scratch->now[d] = at + (size_t)(2 * d + 1) * lines;
-        scratch->lowest_before[d] = (int *)scratch->lowest_block + (size_t)(2 * d) * (size_t)width;
-        scratch->lowest_now[d] = (int *)scratch->lowest_block + (size_t)(2 * d + 1) * (size_t)width;
+        s->before[d] = at + PAD;
+        s->now[d] = at + line + PAD;
+        s->lowest_before[d] = at + 2 * line;
+        s->lowest_now[d] = at + 2 * line + pixels;
+        at += 2 * (line + pixels);
     }
-    scratch->along[0] = at + 6 * lines;
-    scratch->along[1] = at + 6 * lines + line;
+    s->along[0] = at + PAD;
+    s->along[1] = at + MVS_PLANES_MAX + 3 * PAD;
+    memset(s->nothing, 255, sizeof(s->nothing));
     return LUMI_OK;
 }
 
-static void scratch_finish(struct sgm_scratch *scratch)
+static void scratch_finish(struct sgm_scratch *s)
 {
-    lumi_free(scratch->block);
-    lumi_free(scratch->lowest_block);
-    lumi_free(scratch->sum);
+    lumi_free(s->bytes);
+    lumi_free(s->sum);
 }
 
-/* A path begins: its costs are the pixel's own. */
-static int path_begin(const uint8_t *cost, int planes, int16_t *path, uint16_t *sum)
+/* A step to the next plane stays between neighbouring groups. */
+static void init_place(struct place *place, const struct mvs_block *block)
 {
-    int lowest = INT16_MAX;
+    uint8_t groups[MVS_GROUPS_MAX];
+    const int count = mvs_groups(block->groups, groups);
 
-    for (int k = 0; k < planes; k++) {
-        path[k] = cost[k];
-        sum[k] = (uint16_t)(sum[k] + cost[k]);
-        lowest = cost[k] < lowest ? cost[k] : lowest;
+    place->block = block;
+    memset(place->below, STEP_PENALTY, (size_t)block->lanes);
+    memset(place->above, STEP_PENALTY, (size_t)block->lanes);
+    for (int i = 0; i < count; i++) {
+        if (i == 0 || groups[i - 1] + 1 != groups[i])
+            place->below[MVS_GROUP * i] = 255;
+        if (i + 1 == count || groups[i + 1] != groups[i] + 1)
+            place->above[MVS_GROUP * i + MVS_GROUP - 1] = 255;
     }
-    return lowest;
 }
 
-/* One row of a pass. step: +1 rightwards and from above, −1 leftwards and from below. */
-static void pass_row(const struct sgm_job *job, struct sgm_scratch *s, int y, bool first, int step, uint16_t *sums)
+/* `path` of a pixel of another block, as this block's planes. */
+static const uint8_t *move(const struct mvs_block *from, const struct mvs_block *to, const uint8_t *path,
+                           uint8_t *moved)
 {
-    const int width = job->image->width, planes = job->planes;
-    const size_t line = (size_t)planes + 2 * PAD;
+    int lane = 0;
+
+    if (from->groups == to->groups)
+        return path;
+    for (uint32_t rest = from->groups | to->groups, bit; rest; rest &= ~bit) {
+        bit = rest & (0 - rest);
+        if (to->groups & bit) {
+            if (from->groups & bit)
+                memcpy(moved + lane, path, MVS_GROUP);
+            else
+                memset(moved + lane, 255, MVS_GROUP);
+            lane += MVS_GROUP;
+        }
+        path += from->groups & bit ? MVS_GROUP : 0;
+    }
+    return moved;
+}
+
+/* Where in a row's lines a pixel's lanes are. */
+static size_t line_at(const struct mvs_block *block, int x)
+{
+    return (size_t)block->column * MVS_BLOCK + (size_t)(x % MVS_BLOCK) * (size_t)block->lanes;
+}
+
+/* One path's way into pixel x from pixel `from`, whose block is given (NULL: the path begins). */
+static void enter(struct mvs_step *step, int d, struct sgm_scratch *s, const struct place *place,
+                  const struct mvs_block *from, const uint8_t *path, int lowest, int p2)
+{
+    if (from) {
+        step->previous[d] = move(from, place->block, path, s->moved[d] + PAD);
+        step->lowest[d] = lowest;
+        step->p2[d] = p2;
+    } else {
+        step->previous[d] = s->nothing + PAD;
+        step->lowest[d] = step->p2[d] = 0;
+    }
+}
+
+/* One row of a pass. direction: +1 rightwards and from above, −1 leftwards and from below. add: the row has sums. */
+static void pass_row(const struct sgm_job *job, struct sgm_scratch *s, int y, bool first, int direction, bool add)
+{
+    const int width = job->image->width, columns = job->search->columns;
+    const struct mvs_block *blocks = job->search->blocks + (size_t)(y / MVS_BLOCK) * (size_t)columns;
+    const int y_before = first ? y : y - direction;
+    const struct mvs_block *blocks_before = job->search->blocks + (size_t)(y_before / MVS_BLOCK) * (size_t)columns;
     const uint32_t *pixels = job->image->pixels + (size_t)y * (size_t)width;
-    const uint32_t *pixels_before = first ? pixels : pixels - step * width;
+    const uint32_t *pixels_before = job->image->pixels + (size_t)y_before * (size_t)width;
+    struct place place = {0};
+    struct mvs_step step = {.add = add};
     int lowest_along = 0;
 
     for (int i = 0; i < width; i++) {
-        const int x = step > 0 ? i : width - 1 - i;
-        const uint8_t *cost = job->volume + ((size_t)y * (size_t)width + (size_t)x) * (size_t)planes;
-        uint16_t *sum = sums + (size_t)x * (size_t)planes;
-        if (i == 0)
-            lowest_along = path_begin(cost, planes, s->along[i & 1], sum);
-        else
-            lowest_along = job->kernels->path(cost, s->along[(i - 1) & 1], lowest_along, p1_of,
-                                              jump_penalty(pixels[x], pixels[x - step]), planes, s->along[i & 1], sum);
+        const int x = direction > 0 ? i : width - 1 - i;
+        const struct mvs_block *block = blocks + x / MVS_BLOCK, *beside = blocks + (x - direction) / MVS_BLOCK;
+        const size_t at = block->at + (size_t)(y % MVS_BLOCK * MVS_BLOCK + x % MVS_BLOCK) * (size_t)block->lanes;
+        if (block != place.block) {
+            init_place(&place, block);
+            step.below = place.below;
+            step.above = place.above;
+            step.lanes = block->lanes;
+        }
+        step.cost = job->volume + at;
+        step.sum = s->sum + (at - s->begin);
+        enter(&step, 3, s, &place, i > 0 ? beside : NULL, s->along[(i + 1) & 1], lowest_along,
+              i > 0 ? jump_penalty(pixels[x], pixels[x - direction]) : 0);
+        step.path[3] = s->along[i & 1];
         for (int d = 0; d < 3; d++) {
             const int from = x + d - 1;
-            int16_t *now = s->now[d] + (size_t)x * line;
-            if (first || from < 0 || from >= width)
-                s->lowest_now[d][x] = path_begin(cost, planes, now, sum);
-            else
-                s->lowest_now[d][x] =
-                    job->kernels->path(cost, s->before[d] + (size_t)from * line, s->lowest_before[d][from], p1_of,
-                                       jump_penalty(pixels[x], pixels_before[from]), planes, now, sum);
+            const bool there = !first && from >= 0 && from < width;
+            const struct mvs_block *other = there ? blocks_before + from / MVS_BLOCK : NULL;
+            enter(&step, d, s, &place, other, there ? s->before[d] + line_at(other, from) : NULL,
+                  there ? s->lowest_before[d][from] : 0, there ? jump_penalty(pixels[x], pixels_before[from]) : 0);
+            step.path[d] = s->now[d] + line_at(block, x);
         }
+        job->kernels->step(&step);
+        lowest_along = step.lowest[3];
+        for (int d = 0; d < 3; d++)
+            s->lowest_now[d][x] = (uint8_t)step.lowest[d];
     }
     for (int d = 0; d < 3; d++) {
-        int16_t *lines = s->before[d];
-        int *lowest = s->lowest_before[d];
+        uint8_t *lines = s->before[d], *lowest = s->lowest_before[d];
         s->before[d] = s->now[d];
         s->now[d] = lines;
         s->lowest_before[d] = s->lowest_now[d];
@@ -121,53 +189,69 @@ static void pass_row(const struct sgm_job *job, struct sgm_scratch *s, int y, bo
     }
 }
 
-/* The plane with the smallest sum, to a fraction by the parabola through its neighbours. */
-static float pick(const uint16_t *sum, int planes)
+/* The plane of sum[best], to a fraction by the parabola through its neighbours. */
+static float pick(const struct place *place, const uint8_t *groups, const uint16_t *sum, int best)
 {
-    unsigned lowest = UINT16_MAX + 1u;
-    int best = 0;
+    const float plane = (float)(MVS_GROUP * groups[best / MVS_GROUP] + best % MVS_GROUP);
 
-    for (int k = 0; k < planes; k++)
-        if (sum[k] < lowest) {
-            lowest = sum[k];
-            best = k;
+    if (place->below[best] == 255 || place->above[best] == 255)
+        return plane;
+    float before = sum[best - 1], after = sum[best + 1], curve = before - 2 * (float)sum[best] + after;
+    return plane + (curve > 0 ? 0.5f * (before - after) / curve : 0);
+}
+
+static void pick_row(const struct sgm_job *job, const struct sgm_scratch *s, int y)
+{
+    const int width = job->image->width;
+    const struct mvs_block *blocks = job->search->blocks + (size_t)(y / MVS_BLOCK) * (size_t)job->search->columns;
+    struct place place = {0};
+    uint8_t groups[MVS_GROUPS_MAX];
+
+    for (int x = 0; x < width; x++) {
+        const struct mvs_block *block = blocks + x / MVS_BLOCK;
+        const size_t at = block->at + (size_t)(y % MVS_BLOCK * MVS_BLOCK + x % MVS_BLOCK) * (size_t)block->lanes;
+        if (block != place.block) {
+            init_place(&place, block);
+            mvs_groups(block->groups, groups);
         }
-    if (best == 0 || best == planes - 1)
-        return (float)best;
-    float before = sum[best - 1], after = sum[best + 1], curve = before - 2 * (float)lowest + after;
-    return (float)best + (curve > 0 ? 0.5f * (before - after) / curve : 0);
+        const uint16_t *sum = s->sum + (at - s->begin);
+        const int best = job->kernels->smallest(sum, block->lanes);
+        job->planes[(size_t)y * (size_t)width + (size_t)x] = pick(&place, groups, sum, best);
+    }
 }
 
 static int sgm_band(void *context, int band, int thread)
 {
     const struct sgm_job *job = context;
-    const int width = job->image->width, height = job->image->height, planes = job->planes;
-    const int top = band * BAND_ROWS, bottom = top + BAND_ROWS < height ? top + BAND_ROWS : height;
-    const int first = top > BAND_OVERLAP ? top - BAND_OVERLAP : 0;
-    const int last = bottom + BAND_OVERLAP < height ? bottom + BAND_OVERLAP : height;
-    const size_t row = (size_t)width * (size_t)planes;
+    const struct mvs_search *search = job->search;
+    const int height = job->image->height, top = band * BAND_BLOCKS * MVS_BLOCK;
+    const int bottom = top + BAND_BLOCKS * MVS_BLOCK < height ? top + BAND_BLOCKS * MVS_BLOCK : height;
+    const int first = band > 0 ? top - OVERLAP_BLOCKS * MVS_BLOCK : 0;
+    const int last = bottom + OVERLAP_BLOCKS * MVS_BLOCK < height ? bottom + OVERLAP_BLOCKS * MVS_BLOCK : height;
+    const int end_block = (last + MVS_BLOCK - 1) / MVS_BLOCK * search->columns;
+    const size_t begin = search->blocks[first / MVS_BLOCK * search->columns].at;
+    const size_t end = end_block < search->rows * search->columns ? search->blocks[end_block].at : search->size;
     struct sgm_scratch scratch;
     int code;
 
     (void)thread;
-    LUMI_GOTO(code, done, scratch_init(&scratch, width, last - first, planes));
+    LUMI_GOTO(code, done, scratch_init(&scratch, search, job->image->width, begin, end));
     for (int y = first; y < bottom; y++)
-        pass_row(job, &scratch, y, y == first, 1, scratch.sum + (size_t)(y - first) * row);
+        pass_row(job, &scratch, y, y == first, 1, false);
     for (int y = last - 1; y >= top; y--)
-        pass_row(job, &scratch, y, y == last - 1, -1, scratch.sum + (size_t)(y - first) * row);
+        pass_row(job, &scratch, y, y == last - 1, -1, y < bottom);
     for (int y = top; y < bottom; y++)
-        for (int x = 0; x < width; x++)
-            job->result[(size_t)y * (size_t)width + (size_t)x] =
-                pick(scratch.sum + (size_t)(y - first) * row + (size_t)x * (size_t)planes, planes);
+        pick_row(job, &scratch, y);
 done:
     scratch_finish(&scratch);
     return code;
 }
 
-int mvs_sgm(const struct mvs_image *image, const uint8_t *volume, int planes, int threads, float *result)
+int mvs_sgm(const struct mvs_image *image, const uint8_t *volume, const struct mvs_search *search, int threads,
+            float *planes)
 {
-    struct sgm_job job = {image, mvs_kernels(), volume, planes, result};
-    const int bands = (image->height + BAND_ROWS - 1) / BAND_ROWS;
+    struct sgm_job job = {image, mvs_kernels(), search, volume, planes};
+    const int rows = BAND_BLOCKS * MVS_BLOCK, bands = (image->height + rows - 1) / rows;
 
     return lumi_parallel_for(bands, threads, sgm_band, &job);
 }

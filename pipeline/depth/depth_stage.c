@@ -231,7 +231,7 @@ static int make(struct lumi_run *run, void *data, int index, int thread, const c
 const struct lumi_stage lumi_stage_match = {
     .name = "match",
     .title = "matching",
-    .version = 2,
+    .version = 3,
     .extension = ".exr",
     .key = match_key,
     .begin = match_begin,

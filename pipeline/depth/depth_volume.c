@@ -1,6 +1,6 @@
-/* The plane sweep: costs of every plane at every pixel, over the neighbours that see it best (after Collins 1996, "A
- * space-sweep approach to true multi-image matching"; the choice of neighbours is Kang, Szeliski and Chai 2001,
- * "Handling occlusions in dense multi-view stereo", temporal selection). */
+/* The plane sweep: costs of the planes searched at every pixel, over the neighbours that see it best (after Collins
+ * 1996, "A space-sweep approach to true multi-image matching"; the choice of neighbours is Kang, Szeliski and Chai
+ * 2001, "Handling occlusions in dense multi-view stereo", temporal selection). */
 #include "pipeline/depth/mvs_priv.h"
 #include "proto/base/parallel.h"
 
@@ -9,38 +9,100 @@
 struct volume_job {
     const struct mvs_image *image;
     const struct mvs_target *targets;
+    const struct mvs_planes *planes;
+    const struct mvs_search *search;
     const struct mvs_kernels *kernels;
-    int count, planes;
+    int count;
     uint8_t *volume;
 };
 
-static int volume_row(void *context, int y, int thread)
+static void init_ends(struct mvs_ends *ends, const struct mvs_target *target, const struct mvs_planes *planes,
+                      int groups, const uint8_t *group)
 {
-    const struct volume_job *job = context;
-    const struct mvs_image *image = job->image;
-    const int planes = job->planes, best = (job->count + 1) / 2;
-    uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX];
+    float w[2 * MVS_GROUPS_MAX];
+    int count = 0;
 
-    (void)thread;
-    for (int x = 0; x < image->width; x++) {
-        const size_t at = (size_t)y * (size_t)image->width + (size_t)x;
-        memset(cost, MVS_INVALID, sizeof(cost));
-        for (int n = 0; n < job->count; n++) {
-            const float *r = job->targets[n].rotation;
+    for (int i = 0; i < groups; i++) {
+        if (i == 0 || group[i] != group[i - 1] + 1)
+            w[count++] = (float)(planes->first + MVS_GROUP * group[i] * planes->step);
+        ends->end[i] = (uint8_t)(count - 1);
+        w[count++] = (float)(planes->first + MVS_GROUP * (group[i] + 1) * planes->step);
+    }
+    while (count % 8) {
+        w[count] = w[count - 1];
+        count++;
+    }
+    ends->groups = groups;
+    ends->count = count;
+    for (int i = 0; i < count; i++) {
+        ends->x[i] = w[i] * target->shift[0];
+        ends->y[i] = w[i] * target->shift[1];
+        ends->z[i] = w[i] * target->shift[2];
+    }
+}
+
+/* A row of pixels of a block, neighbour by neighbour: what one pixel's sweep reads, the next one's mostly reads again.
+ */
+struct block_row {
+    uint8_t cost[MVS_BLOCK][LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX];
+};
+
+static void sweep_row(const struct volume_job *job, const struct mvs_ends *ends, int left, int right, int y,
+                      struct block_row *row)
+{
+    const struct mvs_image *image = job->image;
+    const uint32_t *colours = image->pixels + (size_t)y * (size_t)image->width;
+
+    for (int n = 0; n < job->count; n++) {
+        const struct mvs_target *target = &job->targets[n];
+        const float *r = target->rotation;
+        for (int x = left; x < right; x++) {
             float a[3];
             for (int i = 0; i < 3; i++)
                 a[i] = r[3 * i] * image->tan_x[x] + r[3 * i + 1] * image->tan_y[y] + r[3 * i + 2];
-            job->kernels->sweep(&job->targets[n], a, image->pixels[at], planes, cost[n]);
+            job->kernels->sweep(target, &ends[n], a, colours[x], row->cost[x - left][n]);
         }
-        job->kernels->combine(cost, best, planes, job->volume + at * (size_t)planes);
     }
+}
+
+static void sweep_block(const struct volume_job *job, int row, int column, struct block_row *costs)
+{
+    const struct mvs_image *image = job->image;
+    const struct mvs_block *block = job->search->blocks + (size_t)row * (size_t)job->search->columns + column;
+    const int best = (job->count + 1) / 2, left = column * MVS_BLOCK, top = row * MVS_BLOCK;
+    const int right = left + MVS_BLOCK < image->width ? left + MVS_BLOCK : image->width;
+    const int bottom = top + MVS_BLOCK < image->height ? top + MVS_BLOCK : image->height;
+    struct mvs_ends ends[LUMI_MVS_NEIGHBOURS];
+    uint8_t group[MVS_GROUPS_MAX];
+    const int groups = mvs_groups(block->groups, group);
+
+    for (int n = 0; n < job->count; n++)
+        init_ends(&ends[n], &job->targets[n], job->planes, groups, group);
+    for (int y = top; y < bottom; y++) {
+        uint8_t *result = job->volume + block->at + (size_t)(y - top) * MVS_BLOCK * (size_t)block->lanes;
+        sweep_row(job, ends, left, right, y, costs);
+        for (int x = left; x < right; x++, result += block->lanes)
+            job->kernels->combine(costs->cost[x - left], best, block->lanes, result);
+    }
+}
+
+static int volume_row(void *context, int row, int thread)
+{
+    const struct volume_job *job = context;
+
+    struct block_row costs;
+
+    (void)thread;
+    memset(&costs, MVS_INVALID, sizeof(costs)); /* neighbours that are not there */
+    for (int column = 0; column < job->search->columns; column++)
+        sweep_block(job, row, column, &costs);
     return LUMI_OK;
 }
 
-int mvs_volume(const struct mvs_image *image, int count, const struct mvs_target *targets, int planes, int threads,
-               uint8_t *volume)
+int mvs_volume(const struct mvs_image *image, int count, const struct mvs_target *targets,
+               const struct mvs_planes *planes, const struct mvs_search *search, int threads, uint8_t *volume)
 {
-    struct volume_job job = {image, targets, mvs_kernels(), count, planes, volume};
+    struct volume_job job = {image, targets, planes, search, mvs_kernels(), count, volume};
 
-    return lumi_parallel_for(image->height, threads, volume_row, &job);
+    return lumi_parallel_for(search->rows, threads, volume_row, &job);
 }

@@ -14,11 +14,6 @@ enum { COARSE = 4 };   /* the range of depths is found at a quarter of the size 
 enum { NARROWED = 8 }; /* a range that shrinks so much was searched in steps that are too wide */
 enum { ROUNDS_MAX = 4 };
 
-struct plane_range {
-    double first, step; /* w of plane 0, and between planes */
-    int planes;
-};
-
 void lumi_mvs_defaults(struct lumi_mvs_settings *settings)
 {
     *settings = (struct lumi_mvs_settings){.step_px = 0.6};
@@ -49,9 +44,8 @@ static double travel(const struct lumi_mvs_view *view, const struct lumi_mvs_vie
     return sum;
 }
 
-static struct plane_range choose_planes(const struct lumi_mvs_view *view, int count,
-                                        const struct lumi_mvs_view *neighbours, double low, double high, double step_px,
-                                        int most)
+static struct mvs_planes choose_planes(const struct lumi_mvs_view *view, int count,
+                                       const struct lumi_mvs_view *neighbours, double low, double high, double step_px)
 {
     double longest = 0;
 
@@ -59,39 +53,54 @@ static struct plane_range choose_planes(const struct lumi_mvs_view *view, int co
         for (int i = 0; i < 25; i++)
             longest = fmax(longest, travel(view, &neighbours[n], view->grid->width * (0.1 + 0.2 * (i % 5)),
                                            view->grid->height * (0.1 + 0.2 * (i / 5)), low, high));
-    int planes = (int)fmin(ceil(longest / step_px) + 1, most);
-    planes = (planes + 15) / 16 * 16;
-    return (struct plane_range){low, (high - low) / (planes - 1), planes};
+    int planes = (int)fmin(ceil(longest / step_px) + 1, MVS_PLANES_MAX);
+    planes = (planes + 2 * MVS_LANES - 1) / (2 * MVS_LANES) * (2 * MVS_LANES);
+    return (struct mvs_planes){low, (high - low) / (planes - 1), planes};
 }
 
-/* Sweep and choice at 1/divisor of the size; result in planes. */
+static void level_finish(struct mvs_level *level)
+{
+    lumi_free(level->chosen);
+    memset(level, 0, sizeof(*level));
+}
+
+/* Sweep and choice at 1/divisor of the size, of the planes that `half`, a level of half the size, suggests, or of all
+ * (NULL). */
 static int match_at(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours, int divisor,
-                    const struct plane_range *range, int threads, float *result)
+                    const struct mvs_planes *planes, const struct mvs_level *half, int threads, struct mvs_level *level)
 {
     struct mvs_image image = {0};
+    struct mvs_search search = {0};
     struct mvs_target *targets = lumi_calloc((size_t)count, sizeof(*targets));
     uint8_t *volume = NULL;
     int code = LUMI_ERR_NOMEM;
 
-    if (!targets)
+    *level = (struct mvs_level){view->grid->width / divisor, view->grid->height / divisor, *planes, NULL};
+    level->chosen = lumi_alloc((size_t)level->width * (size_t)level->height, sizeof(float));
+    if (!targets || !level->chosen)
         goto done;
+    if (half)
+        LUMI_GOTO(code, done, mvs_search_from(&search, level->width, level->height, planes, half));
+    else
+        LUMI_GOTO(code, done, mvs_search_all(&search, level->width, level->height, planes->count));
     LUMI_GOTO(code, done, mvs_image_init(&image, view, divisor));
-    for (int n = 0; n < count; n++) {
+    for (int n = 0; n < count; n++)
         LUMI_GOTO(code, done, mvs_target_init(&targets[n], view, &neighbours[n], divisor));
-        mvs_target_planes(&targets[n], range->planes, (float)range->first, (float)range->step);
-    }
     code = LUMI_ERR_NOMEM;
-    volume = lumi_alloc((size_t)image.width * (size_t)image.height, (size_t)range->planes);
+    volume = lumi_alloc(search.size, 1);
     if (!volume)
         goto done;
-    LUMI_GOTO(code, done, mvs_volume(&image, count, targets, range->planes, threads, volume));
-    LUMI_GOTO(code, done, mvs_sgm(&image, volume, range->planes, threads, result));
+    LUMI_GOTO(code, done, mvs_volume(&image, count, targets, planes, &search, threads, volume));
+    LUMI_GOTO(code, done, mvs_sgm(&image, volume, &search, threads, level->chosen));
 done:
     lumi_free(volume);
     for (int n = 0; targets && n < count; n++)
         mvs_target_finish(&targets[n]);
     lumi_free(targets);
+    mvs_search_finish(&search);
     mvs_image_finish(&image);
+    if (code != LUMI_OK)
+        level_finish(level);
     return code;
 }
 
@@ -107,46 +116,62 @@ static double nearest_searched(const struct lumi_mvs_view *view, int count, cons
     return 1 / fmin(fmax(NEAREST_SEARCHED, LEAST_BASELINES * longest), MOST_BASELINES * longest);
 }
 
-/* Narrows [low, high] to the depths that a search at low resolution finds, less one in two thousand at either end. */
-static int narrow_range(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours,
-                        int threads, double *low, double *high)
+/* Narrows [low, high] to the depths found at low resolution, less one in two thousand at either end. */
+static void narrow_range(const struct mvs_level *level, double *low, double *high)
 {
-    const int width = view->grid->width / COARSE, height = view->grid->height / COARSE;
-    const long pixels = (long)width * height, few = pixels / 2000 + 1;
-    struct plane_range range = choose_planes(view, count, neighbours, *low, *high, 0.8 * COARSE, MVS_PLANES_MAX);
+    const long pixels = (long)level->width * level->height, few = pixels / 2000 + 1;
+    const struct mvs_planes *planes = &level->planes;
     long histogram[MVS_PLANES_MAX] = {0}, sum = 0;
-    int first = 0, last = range.planes - 1;
-    float *coarse;
+    int first = 0, last = planes->count - 1;
 
-    if (width < 16 || height < 16)
-        return LUMI_OK;
-    coarse = lumi_alloc((size_t)pixels, sizeof(float));
-    if (!coarse)
-        return LUMI_ERR_NOMEM;
-    int code = match_at(view, count, neighbours, COARSE, &range, threads, coarse);
-    for (long i = 0; code == LUMI_OK && i < pixels; i++)
-        histogram[(int)(coarse[i] + 0.5f)]++;
+    for (long i = 0; i < pixels; i++)
+        histogram[(int)(level->chosen[i] + 0.5f)]++;
     for (sum = histogram[first]; first < last && sum < few;)
         sum += histogram[++first];
     for (sum = histogram[last]; last > first && sum < few;)
         sum += histogram[--last];
-    double w_low = range.first + (first - 3) * range.step, w_high = range.first + (last + 3) * range.step;
-    *low = fmax(*low, w_low);
-    *high = fmin(*high, w_high);
-    lumi_free(coarse);
-    return code;
+    *low = fmax(*low, planes->first + (first - 3) * planes->step);
+    *high = fmin(*high, planes->first + (last + 3) * planes->step);
 }
 
-static int find_range(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours, int threads,
-                      double *low, double *high)
+/* The search at low resolution; where nobody stated the range of depths, it finds that as well. */
+static int match_coarse(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours,
+                        bool find_range, int threads, double *low, double *high, struct mvs_level *level)
 {
     double before = INFINITY;
 
-    for (int i = 0; i < ROUNDS_MAX && *high - *low < before / NARROWED; i++) {
+    if (view->grid->width / COARSE < 16 || view->grid->height / COARSE < 16)
+        return LUMI_OK;
+    for (int i = 0; i < (find_range ? ROUNDS_MAX : 1) && *high - *low < before / NARROWED; i++) {
+        const struct mvs_planes planes = choose_planes(view, count, neighbours, *low, *high, 0.8 * COARSE);
         before = *high - *low;
-        LUMI_TRY(narrow_range(view, count, neighbours, threads, low, high));
+        level_finish(level);
+        LUMI_TRY(match_at(view, count, neighbours, COARSE, &planes, NULL, threads, level));
+        if (find_range)
+            narrow_range(level, low, high);
     }
     return LUMI_OK;
+}
+
+/* The whole search, from coarse to fine. */
+static int match(const struct lumi_mvs_view *view, int count, const struct lumi_mvs_view *neighbours,
+                 const struct lumi_mvs_settings *settings, int threads, double low, double high,
+                 struct mvs_level *level)
+{
+    const bool find_range = !(settings->near_m > 0) || !(settings->far_m > 0);
+    struct mvs_level coarse = {0}, half = {0};
+    int code;
+
+    LUMI_GOTO(code, done, match_coarse(view, count, neighbours, find_range, threads, &low, &high, &coarse));
+    const struct mvs_planes planes = choose_planes(view, count, neighbours, low, high, settings->step_px);
+    const struct mvs_planes half_planes = {planes.first, 2 * planes.step, planes.count / 2};
+    LUMI_GOTO(code, done,
+              match_at(view, count, neighbours, 2, &half_planes, coarse.chosen ? &coarse : NULL, threads, &half));
+    LUMI_GOTO(code, done, match_at(view, count, neighbours, 1, &planes, &half, threads, level));
+done:
+    level_finish(&coarse);
+    level_finish(&half);
+    return code;
 }
 
 int mvs_check(const struct lumi_mvs_view *view, bool depth, struct lumi_error *error)
@@ -169,7 +194,7 @@ int lumi_mvs_match(const struct lumi_mvs_view *view, int count, const struct lum
     double low = settings->far_m > 0 ? 1 / settings->far_m : 0;
     double high =
         settings->near_m > 0 ? 1 / settings->near_m : fmax(nearest_searched(view, count, neighbours), 2 * low);
-    float *planes = NULL;
+    struct mvs_level level = {0};
     int code;
 
     memset(inverse_depth, 0, sizeof(*inverse_depth));
@@ -183,24 +208,17 @@ int lumi_mvs_match(const struct lumi_mvs_view *view, int count, const struct lum
         LUMI_TRY(mvs_check(&neighbours[n], false, error));
     const int width = view->grid->width, height = view->grid->height;
     LUMI_GOTO(code, done, lumi_raster_create(inverse_depth, width, height, 1, LUMI_F32));
-    struct plane_range range = {low, 0, 16};
-    code = LUMI_ERR_NOMEM;
-    planes = lumi_calloc((size_t)width * (size_t)height, sizeof(float));
-    if (!planes)
-        goto done;
-    if (count > 0) {
-        if (!(settings->near_m > 0) || !(settings->far_m > 0))
-            LUMI_GOTO(code, done, find_range(view, count, neighbours, threads, &low, &high));
-        range = choose_planes(view, count, neighbours, low, high, settings->step_px, MVS_PLANES_MAX);
-        LUMI_GOTO(code, done, match_at(view, count, neighbours, 1, &range, threads, planes));
-    }
+    if (count > 0)
+        LUMI_GOTO(code, done, match(view, count, neighbours, settings, threads, low, high, &level));
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++)
             lumi_row_f32(inverse_depth, y)[x] =
-                (float)(range.first + (double)planes[(size_t)y * (size_t)width + (size_t)x] * range.step);
+                (float)(count > 0 ? level.planes.first +
+                                        (double)level.chosen[(size_t)y * (size_t)width + (size_t)x] * level.planes.step
+                                  : low);
     code = LUMI_OK;
 done:
-    lumi_free(planes);
+    level_finish(&level);
     if (code != LUMI_OK)
         lumi_raster_finish(inverse_depth);
     return code == LUMI_ERR_NOMEM ? lumi_fail(error, code, "depth: out of memory") : code;

@@ -9,9 +9,13 @@
 #include <stdint.h>
 
 #define MVS_AXIS_CELLS 1024
-#define MVS_PLANES_MAX 192 /* a multiple of 16 */
-#define MVS_COST_MAX 120   /* differences of colour count no more than this */
-#define MVS_INVALID 255    /* cost of a plane that falls outside the neighbour's image */
+#define MVS_PLANES_MAX 192 /* a multiple of 2 · MVS_LANES */
+#define MVS_GROUP 8        /* planes that are searched together, or not at all */
+#define MVS_GROUPS_MAX (MVS_PLANES_MAX / MVS_GROUP)
+#define MVS_LANES 16     /* what the number of planes searched at a pixel is a multiple of */
+#define MVS_BLOCK 16     /* pixels, each way, that search the same planes */
+#define MVS_COST_MAX 120 /* differences of colour count no more than this */
+#define MVS_INVALID 255  /* cost of a plane that falls outside the neighbour's image */
 
 /* Tangent to position along one image axis: in cell i = (tangent − origin) · scale, position = a[i] + b[i] · tangent.
  * The cells at both ends go on outwards. */
@@ -35,7 +39,35 @@ struct mvs_target {
     uint32_t *pixels;
     struct mvs_axis x, y; /* positions are indices into `pixels`, to be rounded */
     float rotation[9], shift[3];
-    float plane_x[MVS_PLANES_MAX], plane_y[MVS_PLANES_MAX], plane_z[MVS_PLANES_MAX]; /* w_k · shift */
+};
+
+/* Planes of equal inverse depth. */
+struct mvs_planes {
+    double first, step; /* w of plane 0, and between planes */
+    int count;          /* a multiple of MVS_LANES */
+};
+
+/* The planes that the pixels of one block search, and where the block's numbers lie in a volume: those of its pixel
+ * (x, y), row by row, at at + (y · MVS_BLOCK + x) · lanes. */
+struct mvs_block {
+    uint32_t groups; /* bit g: planes MVS_GROUP · g and the next */
+    int lanes;       /* MVS_GROUP for every bit, a multiple of MVS_LANES */
+    int column;      /* lanes of the blocks to the left */
+    size_t at;
+};
+
+struct mvs_search {
+    int columns, rows; /* blocks */
+    int widest;        /* lanes of a row of blocks, at most */
+    struct mvs_block *blocks;
+    size_t size; /* of a volume */
+};
+
+/* What was found at one size: chosen[y · width + x], in planes, to a fraction. */
+struct mvs_level {
+    int width, height;
+    struct mvs_planes planes;
+    float *chosen;
 };
 
 /* LUMI_ERR_ARG for a view whose lens, pose or image (with `depth`, also its map) cannot be used. */
@@ -46,21 +78,52 @@ void mvs_image_finish(struct mvs_image *image);
 int mvs_target_init(struct mvs_target *target, const struct lumi_mvs_view *view, const struct lumi_mvs_view *neighbour,
                     int divisor);
 void mvs_target_finish(struct mvs_target *target);
-void mvs_target_planes(struct mvs_target *target, int planes, float w_first, float w_step);
+
+/* Every plane everywhere. */
+int mvs_search_all(struct mvs_search *search, int width, int height, int planes);
+/* What was found at half the size, with the next planes, and what lies around it. */
+int mvs_search_from(struct mvs_search *search, int width, int height, const struct mvs_planes *planes,
+                    const struct mvs_level *half);
+void mvs_search_finish(struct mvs_search *search);
+/* The groups in `bits`, ascending; returns how many. */
+int mvs_groups(uint32_t bits, uint8_t groups[MVS_GROUPS_MAX]);
+
+/* w · shift of the planes at which groups end, for one neighbour. Group i reaches from end[i] to the one after it;
+ * groups that follow one another share an end. */
+struct mvs_ends {
+    int groups, count; /* count: rounded up to a multiple of 8, the last one repeated */
+    uint8_t end[MVS_GROUPS_MAX];
+    float x[2 * MVS_GROUPS_MAX], y[2 * MVS_GROUPS_MAX], z[2 * MVS_GROUPS_MAX];
+};
+
+/* The four paths that reach a pixel in one pass: along its row, and from the three pixels of the row before. */
+#define MVS_PATHS 4
+struct mvs_step {
+    int lanes;
+    const uint8_t *cost;
+    const uint8_t *below, *above;         /* penalty of a step from the plane before, or after; 255: there is none */
+    const uint8_t *previous[MVS_PATHS];   /* with one readable element before and one after */
+    int lowest[MVS_PATHS], p2[MVS_PATHS]; /* of previous[]; the penalty of a jump; together at most 255 */
+    uint8_t *path[MVS_PATHS];
+    uint16_t *sum;
+    bool add; /* sum goes on; else it begins */
+};
 
 /* The kernels; x86/ has variants that give the same numbers. */
 struct mvs_kernels {
-    /* cost[k] for k < planes (a multiple of 16): how far the neighbour's colour, where plane k puts the ray (a: the ray
-     * turned into the neighbour's frame), lies from `colour`; MVS_INVALID outside its image. */
-    void (*sweep)(const struct mvs_target *target, const float a[3], uint32_t colour, int planes, uint8_t *cost);
-    /* One step of a path of semi-global matching: path[k] = cost[k] + min(previous[k], previous[k ± 1] + p1, lowest +
-     * p2) − lowest, sum[k] += path[k]; returns the smallest path[k]. `previous` has one writable element before and one
-     * after its planes. planes: a multiple of 16. */
-    int (*path)(const uint8_t *cost, int16_t *previous, int lowest, int p1, int p2, int planes, int16_t *path,
-                uint16_t *sum);
-    /* result[k]: the mean of the `best` (1..4) smallest costs of plane k, of those that are valid; where none is, a
-     * middling cost. Sorts `cost`. */
-    void (*combine)(uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], int best, int planes, uint8_t *result);
+    /* cost[i · MVS_GROUP + k]: how far the neighbour's colour, where plane k of group i puts the ray (a: the ray turned
+     * into the neighbour's frame), lies from `colour`; MVS_INVALID outside its image. Exact where groups end, and
+     * positions between on the straight line. */
+    void (*sweep)(const struct mvs_target *target, const struct mvs_ends *ends, const float a[3], uint32_t colour,
+                  uint8_t *cost);
+    /* result[k]: the mean of the `best` (1..4) smallest costs of lane k, of those that are valid; where none is, a
+     * middling cost. */
+    void (*combine)(uint8_t cost[LUMI_MVS_NEIGHBOURS][MVS_PLANES_MAX], int best, int lanes, uint8_t *result);
+    /* A step of each path: path[k] = cost[k] + min(previous[k], previous[k − 1] + below[k], previous[k + 1] + above[k],
+     * lowest + p2) − lowest, all at most 255; into sum[k]; lowest becomes that of path[]. */
+    void (*step)(struct mvs_step *step);
+    /* The first of the smallest. */
+    int (*smallest)(const uint16_t *sum, int lanes);
 };
 
 const struct mvs_kernels *mvs_kernels(void);
@@ -69,11 +132,12 @@ extern const struct mvs_kernels mvs_kernels_c;
 extern const struct mvs_kernels mvs_kernels_avx2;
 #endif
 
-/* Plane costs of every pixel of `image`: volume[(y · width + x) · planes + k]. */
-int mvs_volume(const struct mvs_image *image, int count, const struct mvs_target *targets, int planes, int threads,
-               uint8_t *volume);
+/* Costs of the planes searched at every pixel of `image`, into a volume. */
+int mvs_volume(const struct mvs_image *image, int count, const struct mvs_target *targets,
+               const struct mvs_planes *planes, const struct mvs_search *search, int threads, uint8_t *volume);
 
-/* Picks a plane a pixel, to a fraction of a plane: result[y · width + x] in [0, planes − 1]. */
-int mvs_sgm(const struct mvs_image *image, const uint8_t *volume, int planes, int threads, float *result);
+/* Picks a plane a pixel, to a fraction: planes[y · width + x]. */
+int mvs_sgm(const struct mvs_image *image, const uint8_t *volume, const struct mvs_search *search, int threads,
+            float *planes);
 
 #endif
