@@ -65,8 +65,9 @@ void lumi_eye_pose(const struct lumi_pose *pose, int side, double distance, stru
     eye->t = lumi_add(pose->t, lumi_scale(lumi_axis(pose, 0), side * distance / 2));
 }
 
-/* Mean gaze and mean down of all views, and how much they look away from the centre. */
+/* Sums of gaze and down over all views, and how much they look away from the centre. */
 struct arrangement {
+    int count;
     struct lumi_vec3 gaze, down;
     double outwards, nearness;
 };
@@ -77,6 +78,7 @@ static void arrange(const struct lumi_field *field, struct arrangement *a)
     int count = info->view_count[LUMI_LEVEL_FINE];
 
     memset(a, 0, sizeof *a);
+    a->count = count;
     for (int i = 0; i < count; i++) {
         const struct lumi_field_view *view = lumi_field_view(field, LUMI_LEVEL_FINE, i);
         const struct lumi_view_mesh *mesh = lumi_field_mesh(field, LUMI_LEVEL_FINE, i);
@@ -107,21 +109,35 @@ static void plane_path(const struct lumi_field_info *info, const struct arrangem
     lumi_pose_look(eye, gaze, lumi_scale(a->down, -1), pose);
 }
 
+/* Imported captures keep their source's axes, and any of them may point up: the pictures' tops tell which. A rig's own
+ * captures, and those whose pictures agree on no top, have +Z. */
+static struct lumi_vec3 upwards(const struct arrangement *a)
+{
+    const struct lumi_vec3 z = lumi_vec3(0, 0, 1);
+
+    if (lumi_length(a->down) < 0.1 * a->count)
+        return z;
+    struct lumi_vec3 up = lumi_normalize(lumi_scale(a->down, -1));
+    return up.z > 0.99 ? z : up;
+}
+
 static void sphere_path(const struct lumi_field_info *info, const struct arrangement *a, enum lumi_path path,
                         double phase, struct lumi_pose *pose)
 {
-    struct lumi_vec3 up = lumi_vec3(0, 0, 1), around = lumi_vec3(cos(phase), sin(phase), 0);
+    const struct lumi_vec3 up = upwards(a), x = lumi_vec3(1, 0, 0);
     bool inside = a->outwards >= 0;
+    /* +X as far as it is level; then a quarter turn on about up. */
+    struct lumi_vec3 first = lumi_sub(x, lumi_scale(up, lumi_dot(x, up)));
+    first = lumi_normalize(lumi_length(first) > 0.1 ? first : lumi_cross(up, lumi_vec3(0, 0, 1)));
+    struct lumi_vec3 second = lumi_cross(up, first);
 
     if (path == LUMI_PATH_ORBIT) {
+        struct lumi_vec3 around = lumi_add(lumi_scale(first, cos(phase)), lumi_scale(second, sin(phase)));
         struct lumi_vec3 eye = lumi_add(info->centre, lumi_scale(around, (inside ? 0.5 : 1) * info->radius));
         lumi_pose_look(eye, lumi_scale(around, inside ? 1 : -1), up, pose);
-    } else if (inside) {
-        lumi_pose_look(lumi_add(info->centre, lumi_vec3(0.6 * info->radius * sin(phase), 0, 0)), lumi_vec3(1, 0, 0), up,
-                       pose);
     } else {
-        lumi_pose_look(lumi_add(info->centre, lumi_vec3((1 - 0.3 * sin(phase)) * info->radius, 0, 0)),
-                       lumi_vec3(-1, 0, 0), up, pose);
+        double reach = (inside ? 0.6 * sin(phase) : 1 - 0.3 * sin(phase)) * info->radius;
+        lumi_pose_look(lumi_add(info->centre, lumi_scale(first, reach)), lumi_scale(first, inside ? 1 : -1), up, pose);
     }
 }
 

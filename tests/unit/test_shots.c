@@ -3,6 +3,7 @@
 #include "pipeline/exchange/video.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
+#include "synthetic_field.h"
 
 #include <glib.h>
 #include <math.h>
@@ -158,6 +159,36 @@ static void an_abandoned_film_leaves_nothing(void **state)
     assert_int_equal(rmdir(folder), 0); /* empty */
 }
 
+/* The synthetic views' pictures have their tops towards −Y, as those of a COLMAP model mostly do. */
+static void paths_about_a_sphere_stand_as_upright_as_its_views(void **state)
+{
+    struct synthetic_options options = {2, 64, 64, 4, 20, 0, 0};
+    struct lumi_field_content content;
+    struct synthetic_field *synthetic;
+    struct lumi_field *field;
+    struct lumi_writer bytes;
+    struct lumi_pose pose;
+
+    (void)state;
+    lumi_writer_init(&bytes);
+    assert_int_equal(synthetic_field_create(&options, &synthetic, NULL), LUMI_OK);
+    synthetic_field_content(synthetic, &content);
+    content.surface = LUMI_SURFACE_SPHERE;
+    content.centre = lumi_vec3(1, 2, 3);
+    content.radius = 0.5;
+    assert_int_equal(lumi_field_write_memory(&content, &bytes, NULL), LUMI_OK);
+    assert_int_equal(lumi_field_open_memory(bytes.data, bytes.size, "test", 1, &field, NULL), LUMI_OK);
+    for (int i = 0; i < 10; i++) {
+        lumi_path_pose(field, i < 5 ? LUMI_PATH_ORBIT : LUMI_PATH_DOLLY, i, 5, &pose);
+        assert_true(lumi_pose_valid(&pose, 1e-9));
+        assert_vector(lumi_axis(&pose, 1), 0, 1, 0);
+        assert_true(fabs(pose.t.y - 2) < 1e-9);
+    }
+    lumi_field_close(field);
+    synthetic_field_finish(synthetic);
+    lumi_writer_finish(&bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -168,6 +199,7 @@ int main(void)
         cmocka_unit_test(lenses_span_the_field_of_view_that_was_asked_for),
         cmocka_unit_test(the_same_pictures_make_the_same_film),
         cmocka_unit_test(an_abandoned_film_leaves_nothing),
+        cmocka_unit_test(paths_about_a_sphere_stand_as_upright_as_its_views),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
