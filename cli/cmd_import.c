@@ -23,7 +23,7 @@ static const GOptionEntry options[] = {
      "METRES"},
     {"flip", 0, 0, G_OPTION_ARG_STRING, &flip, "Stanford names: x, y or xy count to the left or upwards", "AXES"},
     {"trust", 0, 0, G_OPTION_ARG_NONE, &trust, "do not decode every picture to see whether it is whole", NULL},
-    {"threads", 0, 0, G_OPTION_ARG_INT, &threads, "threads (all)", "N"},
+    {"threads", 'j', 0, G_OPTION_ARG_INT, &threads, "threads (all)", "N"},
     {0},
 };
 

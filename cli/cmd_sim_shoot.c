@@ -96,7 +96,7 @@ done:
 const struct cli_command cli_sim_shoot = {
     .name = "sim shoot",
     .arguments = "PLACE -o CAPTURE",
-    .summary = "photographs a simulated place with a simulated rig",
+    .summary = "photograph a simulated place with a simulated rig",
     .description = "Places: room (an interior), court (an exterior), object (for cameras that look inwards). Writes a "
                    "capture with true poses. A full arc16 is 1,152 frames of 1280x1024: some hours of one core; "
                    "--scale 0.25 is 72 frames of 320x256.",

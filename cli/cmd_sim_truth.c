@@ -149,7 +149,7 @@ done:
 const struct cli_command cli_sim_truth = {
     .name = "sim truth",
     .arguments = "PLACE -o DIR",
-    .summary = "views of a simulated place with true poses and depth",
+    .summary = "make views of a simulated place with true poses and depth",
     .description =
         "Writes DIR/transforms.json (nerfstudio's convention), DIR/images and DIR/depth (OpenEXR, channel Z, "
         "metres along the optical axis): every view of a rig or capture, given poses, or "

@@ -1,6 +1,8 @@
 /* What sub-commands share: progress, numbers and choices from the command line. */
 #include "cli/command.h"
 
+#include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +54,7 @@ int cli_parse_ints(const char *option, const char *text, char separator, int cou
         return LUMI_ERR_ARG;
     LUMI_TRY(cli_parse_doubles(option, text, separator, count, numbers, error));
     for (int i = 0; i < count; i++) {
-        if (numbers[i] != (int)numbers[i])
+        if (!(fabs(numbers[i]) <= INT32_MAX) || numbers[i] != floor(numbers[i]))
             return lumi_fail(error, LUMI_ERR_ARG, "%s %s: whole numbers wanted", option, text);
         values[i] = (int)numbers[i];
     }

@@ -13,6 +13,9 @@
 #include <vpx/vp8cx.h>
 #include <vpx/vpx_encoder.h>
 
+#define SIDE_MIN 2
+#define SIDE_MAX 16384
+
 struct lumi_video {
     char *path;
     struct lumi_new_file file; /* fd −1: not open */
@@ -105,10 +108,12 @@ static int open_file(struct lumi_video *video, struct lumi_error *error)
 int lumi_video_create(const char *path, int width, int height, int frames_per_second, int quality,
                       struct lumi_video **result, struct lumi_error *error)
 {
-    if (width < 2 || height < 2 || width > 16384 || height > 16384 || frames_per_second < 1 ||
-        frames_per_second > 1000 || quality < 0 || quality > 63)
-        return lumi_fail(error, LUMI_ERR_ARG, "%s: a video of %d×%d, %d pictures a second, quality %d", path, width,
-                         height, frames_per_second, quality);
+    if (width < SIDE_MIN || height < SIDE_MIN || width > SIDE_MAX || height > SIDE_MAX)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: pictures of %d×%d; a film's have %d to %d pixels a side", path,
+                         width, height, SIDE_MIN, SIDE_MAX);
+    if (frames_per_second < 1 || frames_per_second > 1000 || quality < 0 || quality > 63)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: %d pictures a second (1 to 1000), quality %d (0 to 63)", path,
+                         frames_per_second, quality);
     struct lumi_video *video = lumi_calloc(1, sizeof *video);
     if (!video)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory for a video", path);
