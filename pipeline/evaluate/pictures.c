@@ -127,6 +127,10 @@ static int begin(struct job *job, const struct lumi_shot *shots, int count, stru
     bool film = g_str_has_suffix(job->output, ".webm");
 
     job->several = count > 1;
+    if (o->depth && !job->several && lumi_image_format_of_name(o->depth) != LUMI_IMAGE_EXR)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: depth is written as .exr", o->depth);
+    if (o->depth && !strcmp(o->depth, job->output))
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: pictures and depth need two places", o->depth);
     if (o->depth && job->several)
         LUMI_TRY(make_folder(o->depth, error));
     if (!film && job->several)

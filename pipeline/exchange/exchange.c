@@ -203,6 +203,9 @@ int lumi_exchange_pose_from(enum lumi_exchange_numbers numbers, const double *so
     double det = determinant(pose->r);
     if (!isfinite(det) || fabs(det) < 1e-9)
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its pose is singular", what);
+    if (!lumi_place_valid(pose->t))
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its pose is farther than %g from the origin", what,
+                         LUMI_PLACE_MAX);
     if (!lumi_pose_valid(pose, 1e-3))
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its pose is no rotation (%s)", what,
                          det < 0 ? "it mirrors" : "it scales or shears");

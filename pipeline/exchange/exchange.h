@@ -42,6 +42,7 @@ struct lumi_exchange_image {
     int camera;     /* index */
     int row, column;
     struct lumi_pose pose;
+    bool in_metres; /* whatever --unit says: the source's reader has applied it */
     enum lumi_exchange_numbers numbers;
     double source[12];
 };

@@ -29,6 +29,13 @@ static char *relative_path(const char *folder, const char *file)
     return g_string_free(path, FALSE);
 }
 
+static bool same_lens(const struct lumi_lens *a, const struct lumi_lens *b)
+{
+    return a->model == b->model && a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
+           a->cx == b->cx && a->cy == b->cy && a->k1 == b->k1 && a->k2 == b->k2 && a->k3 == b->k3 && a->k4 == b->k4 &&
+           a->p1 == b->p1 && a->p2 == b->p2;
+}
+
 /* The lens as the source had it, if it still is the one the tree computes with. */
 static int describe_camera(struct lumi_capture *capture, const struct lumi_capture_frame *frame,
                            struct lumi_exchange_camera *camera, struct lumi_error *error)
@@ -42,8 +49,7 @@ static int describe_camera(struct lumi_capture *capture, const struct lumi_captu
     camera->parameter_count = stored.parameter_count;
     memcpy(camera->parameters, stored.parameters, sizeof stored.parameters);
     if (stored.parameter_count > 0 && lumi_exchange_lens(camera, frame->name, &lens, NULL) == LUMI_OK &&
-        lens.fx == stored.lens.fx && lens.fy == stored.lens.fy && lens.cx == stored.lens.cx &&
-        lens.cy == stored.lens.cy)
+        same_lens(&lens, &stored.lens))
         return LUMI_OK;
     if (!lumi_exchange_describe_lens(&stored.lens, camera))
         return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "%s: frame '%s': a lens that the format cannot describe",
@@ -152,6 +158,7 @@ int lumi_export_transforms(const char *capture, const char *path, bool original_
     g_autofree char *text = NULL;
     struct lumi_exchange exchange;
 
+    LUMI_TRY(lumi_file_check_output(path, capture, error));
     lumi_exchange_init(&exchange);
     int code = lumi_export_list(capture, folder, original_names, &exchange, error);
     if (code == LUMI_OK)
@@ -195,6 +202,7 @@ int lumi_export_colmap(const char *capture, const char *folder, bool text, bool 
     g_autofree char *frames = g_build_filename(capture, "data", "frames", NULL);
     struct lumi_exchange exchange;
 
+    LUMI_TRY(lumi_file_check_output(folder, capture, error));
     /* COLMAP's names are relative to a folder of images, which is given to it apart from the model. */
     lumi_exchange_init(&exchange);
     int code = lumi_export_list(capture, frames, original_names, &exchange, error);

@@ -210,5 +210,9 @@ static int export_work(const struct lumi_export_view *export, struct lumi_error 
 
 int lumi_export_view(const struct lumi_export_view *export, struct lumi_error *error)
 {
+    if (export->depth)
+        LUMI_TRY(lumi_file_check_output(export->depth, export->source, error));
+    if (export->mesh)
+        LUMI_TRY(lumi_file_check_output(export->mesh, export->source, error));
     return g_file_test(export->source, G_FILE_TEST_IS_DIR) ? export_work(export, error) : export_field(export, error);
 }

@@ -127,6 +127,26 @@ static int check_one(void *context, int index, int thread)
     return code;
 }
 
+/* Into metres. */
+static int scale_places(struct lumi_exchange *exchange, const struct lumi_import_options *options,
+                        struct lumi_error *error)
+{
+    if (!(options->unit > 0) || options->unit == 1)
+        return LUMI_OK;
+    for (guint i = 0; i < exchange->images->len; i++) {
+        struct lumi_exchange_image *image = lumi_exchange_image(exchange, (int)i);
+        if (image->in_metres)
+            continue;
+        image->pose.t = lumi_scale(image->pose.t, options->unit);
+        image->numbers = LUMI_EXCHANGE_NONE;
+        if (!lumi_place_valid(image->pose.t))
+            return lumi_fail(error, LUMI_ERR_FORMAT,
+                             "%s: in units of %g m its pose is farther than %g m from the origin", image->original,
+                             options->unit, LUMI_PLACE_MAX);
+    }
+    return LUMI_OK;
+}
+
 int lumi_import_list(const char *source, const struct lumi_import_options *options, struct lumi_exchange *exchange,
                      struct lumi_error *error)
 {
@@ -134,17 +154,7 @@ int lumi_import_list(const char *source, const struct lumi_import_options *optio
     LUMI_TRY(exchange_name_images(exchange, source, error));
     LUMI_TRY(choose(exchange, source, options, error));
     LUMI_TRY(complete_cameras(exchange, error));
-    bool scaled = options->unit > 0 && options->unit != 1;
-    for (guint i = 0; i < exchange->images->len; i++) {
-        struct lumi_exchange_image *image = lumi_exchange_image(exchange, (int)i);
-        if (image->numbers == LUMI_EXCHANGE_NONE && image->source[0] == 0 && image->source[5] == 0 &&
-            image->source[10] == 0)
-            continue; /* no numbers of a source: Stanford names, whose positions are in metres already */
-        if (scaled) {
-            image->pose.t = lumi_scale(image->pose.t, options->unit);
-            image->numbers = LUMI_EXCHANGE_NONE;
-        }
-    }
+    LUMI_TRY(scale_places(exchange, options, error));
     if (options->poses_only)
         return LUMI_OK;
     struct check check = {.exchange = exchange,

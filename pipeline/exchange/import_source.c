@@ -189,6 +189,7 @@ static int add_stanford(GArray *files, const char *folder, const struct lumi_imp
         /* Right is +X of the world, down -Z, forward +Y; positions count to the right and downwards. */
         struct lumi_exchange_image image = {.row = file->place.row,
                                             .column = file->place.column,
+                                            .in_metres = true,
                                             .pose = {{1, 0, 0, 0, 0, 1, 0, -1, 0}, {x, 0, 0 - y}}};
         image.camera = lumi_exchange_add_camera(exchange, &camera);
         image.original = g_strdup(file->name);

@@ -54,8 +54,8 @@ static int get_whole(const struct fields *fields, const char *key, const char *w
     double number;
 
     LUMI_TRY(get_number(fields, key, what, there, &number, error));
-    if (*there && (number != floor(number) || fabs(number) > 1e9))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: '%s' is not a whole number", what, key);
+    if (*there && (number != floor(number) || number < 0 || number > 1e9))
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: '%s' is not a whole number from 0", what, key);
     *value = (int)number;
     return LUMI_OK;
 }
@@ -253,6 +253,9 @@ static int fail_json(const char *text, const char *fault, const char *end, const
         shown++;
     if (fault == end)
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not well-formed JSON: it ends too early (line %d)", name, line);
+    if (shown == 0 && !g_ascii_ispunct(*fault)) /* bytes of a file that is no text are not for a terminal */
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not well-formed JSON: line %d, column %d: byte 0x%02x", name,
+                         line, (int)(fault - start) + 1, (unsigned char)*fault);
     return lumi_fail(error, LUMI_ERR_FORMAT, "%s: not well-formed JSON: line %d, column %d: '%.*s'", name, line,
                      (int)(fault - start) + 1, MAX(shown, 1), fault);
 }

@@ -8,6 +8,7 @@
 #include "pipeline/geometry/disks.h"
 #include "pipeline/geometry/geometry.h"
 #include "pipeline/graph/deliver.h"
+#include "proto/base/file.h"
 
 #include <glib.h>
 #include <string.h>
@@ -54,6 +55,7 @@ int lumi_graph_process(struct lumi_run *run, const char *output, lumi_graph_repo
 {
     const struct lumi_stage *last = NULL;
 
+    LUMI_TRY(lumi_file_check_output(output, run->capture, error));
     LUMI_TRY(lumi_deliver_check(output, error));
     for (int i = 0; lumi_stages[i]; i++) {
         int skipped = 0;

@@ -2,6 +2,7 @@
 #include "pipeline/run/key.h"
 #include "pipeline/run/run_priv.h"
 #include "pipeline/run/sources.h"
+#include "proto/base/file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -132,6 +133,7 @@ int lumi_run_open(const char *capture, const char *work, const struct lumi_param
     run->parameters = *parameters;
     run->threads = threads;
     LUMI_GOTO(code, fail, lumi_sources_load(run, error));
+    LUMI_GOTO(code, fail, lumi_file_check_output(run->work, run->capture, error));
     LUMI_GOTO(code, fail, lock_work(run, alone, error));
     *result = run;
     return LUMI_OK;

@@ -141,6 +141,16 @@ static void remove_leftovers(const char *path)
     free(folder);
 }
 
+/* What is named for output is no input that is missing. */
+static int fail_folder(const char *path, struct lumi_error *error)
+{
+    char *folder = folder_of(path);
+    int code = lumi_fail(error, LUMI_ERR_ARG, "%s: there is no folder '%s'", path, folder ? folder : "");
+
+    free(folder);
+    return code;
+}
+
 int lumi_new_file_open(struct lumi_new_file *file, const char *path, struct lumi_error *error)
 {
     size_t length = strlen(path) + 48;
@@ -162,7 +172,8 @@ int lumi_new_file_open(struct lumi_new_file *file, const char *path, struct lumi
         flock(file->fd, LOCK_EX | LOCK_NB); /* where there are no locks, the process's number has to do */
         return LUMI_OK;
     }
-    code = lumi_fail_errno(error, path, "cannot make a file there");
+    code = errno == ENOENT || errno == ENOTDIR ? fail_folder(path, error)
+                                               : lumi_fail_errno(error, path, "cannot make a file there");
 fail:
     lumi_free(file->path);
     lumi_free(file->temporary);
@@ -195,4 +206,47 @@ int lumi_file_write(const char *path, const void *data, size_t size, bool sync, 
     LUMI_TRY(lumi_new_file_open(&file, path, error));
     int code = write_all(file.fd, data, size) ? lumi_fail_errno(error, path, "cannot write") : LUMI_OK;
     return lumi_new_file_close(&file, code, sync, error);
+}
+
+static bool same_file(const struct stat *a, const struct stat *b)
+{
+    return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
+/* Whether `path`, which need not be there, lies in the folder or is it. Asked of the folders above it one by one, so
+ * that links and other spellings do not matter. */
+static bool lies_in(const char *path, const struct stat *folder)
+{
+    char *above = strdup(path);
+    struct stat status;
+    bool found = false;
+
+    while (above && !found) {
+        char *real = realpath(above, NULL);
+        if (real) { /* from here on the way up is in the name */
+            free(above);
+            above = real;
+            found = stat(above, &status) == 0 && same_file(&status, folder);
+        }
+        if (!strcmp(above, "/") || !strcmp(above, "."))
+            break;
+        char *next = folder_of(above);
+        free(above);
+        above = next;
+    }
+    free(above);
+    return found;
+}
+
+int lumi_file_check_output(const char *path, const char *input, struct lumi_error *error)
+{
+    struct stat status, there;
+
+    if (stat(input, &status))
+        return LUMI_OK;
+    if (S_ISDIR(status.st_mode) && lies_in(path, &status))
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: lies in '%s', which is the input", path, input);
+    if (lstat(path, &there) == 0 && same_file(&there, &status))
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: is the input", path);
+    return LUMI_OK;
 }

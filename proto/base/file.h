@@ -22,7 +22,8 @@ struct lumi_new_file {
     char *path, *temporary;
     int fd; /* to be written to */
 };
-/* Also removes what processes that were killed have left of earlier files of this name. */
+/* Also removes what processes that were killed have left of earlier files of this name. LUMI_ERR_ARG where its folder
+ * is not there. */
 int lumi_new_file_open(struct lumi_new_file *file, const char *path, struct lumi_error *error);
 /* `code` LUMI_OK: renames it; otherwise removes it. `sync`: its bytes and its folder reach the disk before this
  * returns. Returns `code`, or why it could not be kept. */
@@ -31,6 +32,10 @@ int lumi_new_file_close(struct lumi_new_file *file, int code, bool sync, struct 
 /* Makes or replaces a file: whole or not at all. `sync`: its bytes and its folder reach the disk before this returns.
  */
 int lumi_file_write(const char *path, const void *data, size_t size, bool sync, struct lumi_error *error);
+
+/* LUMI_ERR_ARG where a file at `path` (there already or not) would take the place of `input`, or of a part of it: it is
+ * that file, or lies in that folder. */
+int lumi_file_check_output(const char *path, const char *input, struct lumi_error *error);
 
 #ifdef __cplusplus
 }

@@ -64,11 +64,16 @@ void lumi_rotation_from_quaternion(const double q[4], double r[9])
     memcpy(r, m, sizeof m);
 }
 
+bool lumi_place_valid(struct lumi_vec3 t)
+{
+    return fabs(t.x) <= LUMI_PLACE_MAX && fabs(t.y) <= LUMI_PLACE_MAX && fabs(t.z) <= LUMI_PLACE_MAX;
+}
+
 bool lumi_pose_valid(const struct lumi_pose *pose, double tolerance)
 {
     const double *r = pose->r;
 
-    if (!isfinite(pose->t.x) || !isfinite(pose->t.y) || !isfinite(pose->t.z))
+    if (!lumi_place_valid(pose->t))
         return false;
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++) {

@@ -92,7 +92,12 @@ void lumi_pose_look(struct lumi_vec3 eye, struct lumi_vec3 forward, struct lumi_
 void lumi_rotation_to_quaternion(const double r[9], double q[4]);
 void lumi_rotation_from_quaternion(const double q[4], double r[9]);
 
-/* All finite, and r a rotation: rows orthonormal to `tolerance` (1e-3 suits printed matrices), determinant +1. */
+/* No place has a larger coordinate, metres: sums of products of places stay far inside a double. */
+#define LUMI_PLACE_MAX 1e12
+bool lumi_place_valid(struct lumi_vec3 t);
+
+/* t a place, and r a rotation: all finite, rows orthonormal to `tolerance` (1e-3 suits printed matrices), determinant
+ * +1. */
 bool lumi_pose_valid(const struct lumi_pose *pose, double tolerance);
 
 /* The nearest rotation to r, for a matrix that passed lumi_pose_valid (Gram-Schmidt through the quaternion). */

@@ -183,6 +183,18 @@ static int sync_parent(const char *path, struct lumi_error *error)
     return code;
 }
 
+/* The new capture's folder. What is named for output is no input that is missing. */
+static int make_folder(const struct lumi_capture *capture, const char *path, struct lumi_error *error)
+{
+    if (mkdir(capture->path, 0777) == 0)
+        return LUMI_OK;
+    if (errno == EEXIST)
+        return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", capture->path);
+    if (errno == ENOENT || errno == ENOTDIR)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: there is no folder to make it in", path);
+    return lumi_fail_errno(error, capture->path, "create");
+}
+
 int lumi_capture_create_live(const char *path, struct lumi_capture **capture, struct lumi_error *error)
 {
     struct lumi_capture *made;
@@ -191,9 +203,8 @@ int lumi_capture_create_live(const char *path, struct lumi_capture **capture, st
 
     LUMI_TRY(allocate(path, "", &made, error));
     *capture = NULL;
-    if (mkdir(made->path, 0777) < 0) {
-        code = errno == EEXIST ? lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", made->path)
-                               : lumi_fail_errno(error, made->path, "create");
+    code = make_folder(made, path, error);
+    if (code != LUMI_OK) {
         release(made);
         return code;
     }
@@ -251,10 +262,7 @@ int lumi_capture_create(const char *path, struct lumi_capture **capture, struct 
         goto fail;
     }
     LUMI_GOTO(code, fail, clear_partial(made, error));
-    if (mkdir(made->path, 0777) < 0) {
-        code = lumi_fail_errno(error, made->path, "create");
-        goto fail;
-    }
+    LUMI_GOTO(code, fail, make_folder(made, path, error));
     code = populate(made, error);
     if (code != LUMI_OK) {
         lumi_capture_close(made);

@@ -101,6 +101,9 @@ static int put_common(struct sink *sink, const struct lumi_field_content *conten
 {
     struct lumi_writer writer;
 
+    if (!lumi_place_valid(content->centre) || !(content->radius >= 0 && isfinite(content->radius)))
+        return lumi_fail(error, LUMI_ERR_ARG, "a field about (%g, %g, %g) with a radius of %g", content->centre.x,
+                         content->centre.y, content->centre.z, content->radius);
     lumi_writer_init(&writer);
     lumi_write_u8(&writer, (uint8_t)content->surface);
     lumi_write_u8(&writer, (uint8_t)content->disk_shape);

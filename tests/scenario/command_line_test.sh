@@ -39,6 +39,15 @@ expect_line 2 "folder: is a folder" "$lumi" process "a ü.capture" -o folder
 expect_line 2 "nowhere/y.lumi: there is no folder" "$lumi" process "a ü.capture" -o nowhere/y.lumi
 [ -z "$(find "a ü.capture.work" -name '*.exr')" ] || fail "stages ran for an output that cannot be made"
 
+# Nor is there anything to put it in, or it would take the place of what is read.
+expect_line 2 "no folder to make it in" "$lumi" sim shoot room --rig planar:1x1:0.05 --size 64x64 -o nowhere/y.capture
+expect_line 2 "there is no folder 'nowhere'" "$lumi" export "a ü.capture" --transforms nowhere/y.json
+expect_line 2 "which is the input" "$lumi" process "a ü.capture" -o "a ü.capture/data/capture.db"
+expect_line 2 "which is the input" "$lumi" process "a ü.capture" -w "a ü.capture/work" -o y
+expect_line 2 "which is the input" "$lumi" export "a ü.capture" --transforms "folder/../a ü.capture/y.json"
+"$lumi" verify "a ü.capture" >verified || fail "the capture is no longer whole"
+rm verified
+
 # A file over the limit is a write that fails.
 (
     ulimit -f 8 || exit 1
@@ -53,6 +62,15 @@ folder" ] || fail "left behind: $left"
 "$lumi" process "a ü.capture" -o "b é.lumi" >out || fail "no field"
 "$lumi" export "b é.lumi" --view 0 --depth d.exr --mesh m.ply || fail "no depth and mesh of a field"
 "$lumi" export "a ü.capture" --view r00c00 --depth e.exr --mesh n.ply || fail "no depth and mesh of a capture"
+cp "b é.lumi" copy.lumi
+for option in depth mesh; do
+    expect_line 2 "copy.lumi: is the input" "$lumi" export copy.lumi --view 0 --$option ./copy.lumi
+done
+expect_line 2 "depth is written as .exr" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 32x32 -o y.png --depth copy.lumi
+expect_line 2 "need two places" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 32x32 -o y.exr --depth y.exr
+expect_line 2 "2 to 16384 pixels a side" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 1x1 -o y.webm
+expect_line 2 "--size 1e30x1" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 1e30x1 -o y.png
+cmp copy.lumi "b é.lumi" || fail "an export replaced what it read"
 [ "$(wc -c <m.ply)" -eq "$(wc -c <n.ply)" ] || fail "the field's mesh has another size than the work directory's"
 # A capture and its work in a place where nothing can be written can still be exported from.
 mkdir place elsewhere && mv "a ü.capture" "a ü.capture.work" place || exit 1

@@ -66,6 +66,22 @@ static void every_tile(const struct lumi_field *field, int *tiles, int *damaged)
     lumi_tile_decoder_destroy(decoder);
 }
 
+static void what_no_reader_would_take_is_not_written(void **state)
+{
+    struct lumi_field_content content;
+    struct lumi_writer bytes;
+
+    (void)state;
+    lumi_writer_init(&bytes);
+    synthetic_field_content(truth, &content);
+    content.radius = INFINITY;
+    assert_int_equal(lumi_field_write_memory(&content, &bytes, NULL), LUMI_ERR_ARG);
+    content.radius = 1;
+    content.centre.y = NAN;
+    assert_int_equal(lumi_field_write_memory(&content, &bytes, NULL), LUMI_ERR_ARG);
+    lumi_writer_finish(&bytes);
+}
+
 static void a_field_reads_back_as_it_was_written(void **state)
 {
     struct lumi_field *field = open_bytes(file.data, file.size);
@@ -330,6 +346,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_field_reads_back_as_it_was_written),
+        cmocka_unit_test(what_no_reader_would_take_is_not_written),
         cmocka_unit_test(every_tile_shows_its_view),
         cmocka_unit_test(tiles_decode_to_the_same_pixels_in_any_order),
         cmocka_unit_test(error_resilient_fields_read_as_well),

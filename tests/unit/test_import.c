@@ -269,6 +269,34 @@ static void stanford_folders_are_planar_arrays(void **state)
     lumi_free(frames);
 }
 
+/* A pose whose matrix has a diagonal of zeros is a pose like any other. */
+static void a_unit_scales_the_places_of_all_images(void **state)
+{
+    g_autofree char *capture = in_folder("out.capture"), *back = in_folder("back.json");
+    uint8_t *text;
+    size_t size;
+    int count;
+
+    (void)state;
+    write_picture("a.png", 32, 24);
+    write_picture("b.png", 32, 24);
+    write_text("t.json", "{\"w\":32,\"h\":24,\"fl_x\":30,\"frames\":["
+                         "{\"file_path\":\"a.png\",\"transform_matrix\":[[1,0,0,100],[0,1,0,0],[0,0,1,300],[0,0,0,1]]},"
+                         "{\"file_path\":\"b.png\",\"transform_matrix\":[[0,0,1,100],[1,0,0,0],[0,1,0,300],[0,0,0,1]]}"
+                         "]}");
+    options.unit = 0.01;
+    assert_int_equal(import("t.json"), LUMI_OK);
+    struct lumi_capture_frame *frames = frames_of_capture(&count);
+    assert_int_equal(count, 2);
+    for (int i = 0; i < count; i++)
+        assert_true(frames[i].pose.t.x == 1 && frames[i].pose.t.z == 3);
+    lumi_free(frames);
+    assert_int_equal(lumi_export_transforms(capture, back, true, &error), LUMI_OK);
+    assert_int_equal(lumi_file_read(back, 1 << 20, &text, &size, &error), LUMI_OK);
+    assert_null(strstr((const char *)text, "100"));
+    lumi_free(text);
+}
+
 /* ---- Bad input ---- */
 
 static void expect(const char *source, int code, const char *file, const char *cause)
@@ -386,6 +414,53 @@ static void what_is_no_source_is_said_to_be_none(void **state)
     expect(".", LUMI_ERR_FORMAT, folder, "neither");
 }
 
+static void places_beyond_all_measure_are_named(void **state)
+{
+    static const char form[] = "{\"w\":32,\"h\":24,\"fl_x\":30,\"frames\":[{\"file_path\":\"images/p0.png\","
+                               "\"transform_matrix\":[[1,0,0,%s],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]}";
+    g_autofree char *huge = g_strdup_printf(form, "1e300"), *large = g_strdup_printf(form, "-1e11");
+
+    (void)state;
+    write_grid();
+    write_text("t.json", huge);
+    expect("t.json", LUMI_ERR_FORMAT, "images/p0.png", "farther than");
+    write_text("t.json", large);
+    options.unit = 100;
+    expect("t.json", LUMI_ERR_FORMAT, "images/p0.png", "farther than");
+    options.unit = 1;
+    assert_int_equal(import("t.json"), LUMI_OK);
+}
+
+static void what_is_no_text_is_not_shown_as_text(void **state)
+{
+    (void)state;
+    write_text("t.json", "{\"frames\":\x95\x01}");
+    expect("t.json", LUMI_ERR_FORMAT, "t.json", "line 1, column 11: byte 0x95");
+    write_text("t.json", "{\"frames\":[NaN]}");
+    expect("t.json", LUMI_ERR_FORMAT, "t.json", "line 1, column 12: 'NaN'");
+}
+
+/* Export would otherwise replace what it reads. */
+static void nothing_is_written_into_the_capture_that_is_read(void **state)
+{
+    g_autofree char *capture = in_folder("out.capture"), *within = in_folder("out.capture/data/capture.db");
+    g_autofree char *new_file = in_folder("out.capture/data/../new/x.json"), *link = in_folder("link");
+    g_autofree char *by_link = in_folder("link/x.json"), *beside = in_folder("out.capture.json");
+
+    (void)state;
+    write_grid();
+    assert_int_equal(import("transforms.json"), LUMI_OK);
+    assert_int_equal(symlink(capture, link), 0);
+    assert_int_equal(lumi_export_transforms(capture, within, false, &error), LUMI_ERR_ARG);
+    assert_int_equal(lumi_export_transforms(capture, new_file, false, &error), LUMI_ERR_ARG);
+    assert_int_equal(lumi_export_transforms(capture, by_link, false, &error), LUMI_ERR_ARG);
+    assert_int_equal(lumi_export_transforms(link, within, false, &error), LUMI_ERR_ARG);
+    assert_int_equal(lumi_export_colmap(capture, capture, false, false, &error), LUMI_ERR_ARG);
+    assert_int_equal(lumi_export_transforms(capture, beside, false, &error), LUMI_OK);
+    assert_int_equal(g_remove(link), 0);
+    assert_false(g_file_test(new_file, G_FILE_TEST_EXISTS));
+}
+
 static void an_existing_capture_is_not_overwritten(void **state)
 {
     g_autofree char *path = in_folder("out.capture");
@@ -406,6 +481,7 @@ int main(void)
         TEST(transforms_survive_a_round_trip_through_a_capture),
         TEST(colmap_models_survive_a_round_trip_bit_for_bit),
         TEST(stanford_folders_are_planar_arrays),
+        TEST(a_unit_scales_the_places_of_all_images),
         TEST(a_missing_image_is_named),
         TEST(an_image_of_another_size_is_named),
         TEST(a_damaged_image_is_named),
@@ -414,6 +490,9 @@ int main(void)
         TEST(files_of_one_name_in_two_folders_are_told_apart),
         TEST(what_is_no_source_is_said_to_be_none),
         TEST(an_existing_capture_is_not_overwritten),
+        TEST(places_beyond_all_measure_are_named),
+        TEST(what_is_no_text_is_not_shown_as_text),
+        TEST(nothing_is_written_into_the_capture_that_is_read),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
