@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#define BENT_PX 0.06f /* of an axis from a straight line, at twice the density: too little to tell */
+
 static uint8_t clamp_byte(int value)
 {
     return (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
@@ -173,8 +175,8 @@ static int double_pixels(struct mvs_target *target, const uint32_t *pixels, int 
     return LUMI_OK;
 }
 
-/* The table of one axis: exact at the cells' ends, which lie closer together than pixels do. */
-static void init_axis(struct mvs_axis *axis, const double *tangents, int tiles, int divisor)
+/* Exact at the cells' ends, which lie closer together than pixels do. */
+void mvs_axis_init(struct mvs_axis *axis, const double *tangents, int tiles, int divisor)
 {
     const double low = tangents[0], high = tangents[tiles];
     const double pitch = (tangents[1] - tangents[0]) / LUMI_TILE;
@@ -206,6 +208,20 @@ static void init_axis(struct mvs_axis *axis, const double *tangents, int tiles, 
     }
 }
 
+struct mvs_line mvs_axis_line(const struct mvs_axis *axis, float low, float high)
+{
+    const float first = mvs_axis_position(axis, low), last = mvs_axis_position(axis, high);
+    const float cell = 1 / axis->scale, width = high - low;
+
+    if (axis->linear || !(width > 0 && width < MVS_AXIS_CELLS * cell))
+        return (struct mvs_line){axis->linear, axis->a[0], axis->b[0]};
+    const float b = (last - first) / width, a = first - b * low;
+    for (float tangent = low + cell; tangent < high; tangent += cell)
+        if (!(fabsf(mvs_axis_position(axis, tangent) - (a + b * tangent)) <= BENT_PX))
+            return (struct mvs_line){false, 0, 0};
+    return (struct mvs_line){true, a, b};
+}
+
 int mvs_target_init(struct mvs_target *target, const struct lumi_mvs_view *view, const struct lumi_mvs_view *neighbour,
                     int divisor)
 {
@@ -216,8 +232,8 @@ int mvs_target_init(struct mvs_target *target, const struct lumi_mvs_view *view,
     LUMI_GOTO(code, done, image_pixels(neighbour, divisor, &width, &height, &pixels));
     LUMI_GOTO(code, done, double_pixels(target, pixels, width, height));
     const struct lumi_grid *grid = neighbour->grid;
-    init_axis(&target->x, grid->tan_x, grid->cols, divisor);
-    init_axis(&target->y, grid->tan_y, grid->rows, divisor);
+    mvs_axis_init(&target->x, grid->tan_x, grid->cols, divisor);
+    mvs_axis_init(&target->y, grid->tan_y, grid->rows, divisor);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             target->rotation[3 * i + j] = (float)lumi_dot(lumi_axis(&neighbour->pose, i), lumi_axis(&view->pose, j));

@@ -9,17 +9,6 @@ static inline uint8_t lesser(uint8_t a, uint8_t b)
     return a < b ? a : b;
 }
 
-static float axis_position(const struct mvs_axis *axis, float tangent)
-{
-    if (axis->linear)
-        return axis->a[0] + axis->b[0] * tangent;
-    float cell = (tangent - axis->origin) * axis->scale;
-    cell = cell > 0 ? cell : 0;
-    cell = cell < MVS_AXIS_CELLS - 1 ? cell : MVS_AXIS_CELLS - 1;
-    int i = (int)cell;
-    return axis->a[i] + axis->b[i] * tangent;
-}
-
 static int distance(uint32_t a, uint32_t b)
 {
     int sum = 0;
@@ -29,6 +18,11 @@ static int distance(uint32_t a, uint32_t b)
     return sum < MVS_COST_MAX ? sum : MVS_COST_MAX;
 }
 
+static float position(const struct mvs_axis *axis, const struct mvs_line *line, float tangent)
+{
+    return line->straight ? line->a + line->b * tangent : mvs_axis_position(axis, tangent);
+}
+
 static void sweep(const struct mvs_target *target, const struct mvs_ends *ends, const float a[3], uint32_t colour,
                   uint8_t *cost)
 {
@@ -36,8 +30,8 @@ static void sweep(const struct mvs_target *target, const struct mvs_ends *ends, 
 
     for (int e = 0; e < ends->count; e++) {
         float z = a[2] + ends->z[e], scale = z > 0 ? 1 / z : NAN;
-        x[e] = axis_position(&target->x, (a[0] + ends->x[e]) * scale) + 0.5f;
-        y[e] = axis_position(&target->y, (a[1] + ends->y[e]) * scale) + 0.5f;
+        x[e] = position(&target->x, &ends->column, (a[0] + ends->x[e]) * scale) + 0.5f;
+        y[e] = position(&target->y, &ends->row, (a[1] + ends->y[e]) * scale) + 0.5f;
     }
     for (int i = 0; i < ends->groups; i++) {
         const int e = ends->end[i];

@@ -16,15 +16,15 @@ enum { RADIUS = 6, BINS = 64, COLOURS = 766 };
 
 /* A neighbour's map and the way into it. */
 struct confirmer {
-    const struct lumi_mvs_view *view;
-    double rotation[9];
-    struct lumi_vec3 shift;
+    const struct lumi_raster *depth;
+    struct mvs_axis x, y;
+    float rotation[9], shift[3];
     float tolerance; /* of w: AGREE_PX in that neighbour */
 };
 
 struct refine_job {
     const struct lumi_mvs_view *view;
-    struct confirmer confirmers[LUMI_MVS_NEIGHBOURS];
+    struct confirmer *confirmers;
     int count;
     float tolerance; /* of w: a pixel in the neighbour that has the longest baseline */
     float *fused;    /* median of what this map and those that agree with it say */
@@ -45,27 +45,38 @@ static float pixel_pitch(const struct lumi_grid *grid)
 static void init_confirmer(struct confirmer *confirmer, const struct lumi_mvs_view *view,
                            const struct lumi_mvs_view *neighbour)
 {
-    confirmer->view = neighbour;
+    const struct lumi_vec3 shift = lumi_to_camera(&neighbour->pose, view->pose.t);
+
+    confirmer->depth = &neighbour->depth;
+    mvs_axis_init(&confirmer->x, neighbour->grid->tan_x, neighbour->grid->cols, 1);
+    mvs_axis_init(&confirmer->y, neighbour->grid->tan_y, neighbour->grid->rows, 1);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            confirmer->rotation[3 * i + j] = lumi_dot(lumi_axis(&neighbour->pose, i), lumi_axis(&view->pose, j));
-    confirmer->shift = lumi_to_camera(&neighbour->pose, view->pose.t);
-    double baseline = lumi_length(confirmer->shift);
-    confirmer->tolerance = AGREE_PX * pixel_pitch(view->grid) / (float)fmax(baseline, 1e-6);
+            confirmer->rotation[3 * i + j] = (float)lumi_dot(lumi_axis(&neighbour->pose, i), lumi_axis(&view->pose, j));
+    confirmer->shift[0] = (float)shift.x;
+    confirmer->shift[1] = (float)shift.y;
+    confirmer->shift[2] = (float)shift.z;
+    confirmer->tolerance = AGREE_PX * pixel_pitch(view->grid) / (float)fmax(lumi_length(shift), 1e-6);
 }
 
 /* What a neighbour says about the point at inverse depth w of a ray: its inverse depth there, in this view's terms.
  * False where it does not see the place. */
-static bool ask(const struct confirmer *confirmer, double tan_x, double tan_y, float w, float *said)
+static bool ask(const struct confirmer *confirmer, float tan_x, float tan_y, float w, float *said)
 {
-    const struct lumi_grid *grid = confirmer->view->grid;
-    struct lumi_vec3 ray = lumi_rotate(confirmer->rotation, lumi_vec3(tan_x, tan_y, 1));
-    struct lumi_vec3 q = lumi_add(ray, lumi_scale(confirmer->shift, w));
-    double x, y;
+    float q[3];
 
-    if (!lumi_grid_project(grid, q, &x, &y) || !(x >= 0 && y >= 0 && x < grid->width && y < grid->height))
+    for (int i = 0; i < 3; i++) {
+        const float *r = confirmer->rotation + 3 * i;
+        q[i] = r[0] * tan_x + r[1] * tan_y + r[2] + w * confirmer->shift[i];
+    }
+    if (!(q[2] > 1e-6f))
         return false;
-    *said = lumi_row_f32(&confirmer->view->depth, (int)y)[(int)x] * (float)q.z;
+    const float scale = 1 / q[2];
+    const float x = mvs_axis_position(&confirmer->x, q[0] * scale) + 1;
+    const float y = mvs_axis_position(&confirmer->y, q[1] * scale) + 1;
+    if (!(x >= 0 && y >= 0 && x < 2 * (float)confirmer->depth->width && y < 2 * (float)confirmer->depth->height))
+        return false;
+    *said = lumi_row_f32(confirmer->depth, (int)(0.5f * y))[(int)(0.5f * x)] * q[2];
     return true;
 }
 
@@ -95,7 +106,7 @@ static int confirm_row(void *context, int y, int thread)
         lumi_grid_unproject(job->view->grid, x + 0.5, y + 0.5, &tan_x, &tan_y);
         for (int n = 0; n < job->count; n++) {
             float said;
-            if (!ask(&job->confirmers[n], tan_x, tan_y, depth[x], &said))
+            if (!ask(&job->confirmers[n], (float)tan_x, (float)tan_y, depth[x], &said))
                 continue;
             if (fabsf(said - depth[x]) <= job->confirmers[n].tolerance)
                 values[1 + agree++] = said;
@@ -118,19 +129,24 @@ static float weighted_median(const struct refine_job *job, int x, int y, int str
     float low = INFINITY, high = -INFINITY, total = 0, bin_says[BINS] = {0}, bin_values[BINS] = {0};
     int count = 0;
 
-    for (int j = -RADIUS; j <= RADIUS; j++)
-        for (int i = -RADIUS; i <= RADIUS; i++) {
-            const int px = x + i * stride, py = y + j * stride;
-            if (px < 0 || py < 0 || px >= width || py >= height || !job->sure[(size_t)py * (size_t)width + (size_t)px])
+    for (int py = y - RADIUS * stride; py <= y + RADIUS * stride; py += stride) {
+        if (py < 0 || py >= height)
+            continue;
+        const uint8_t *colours = lumi_row_u8(&job->view->image, py), *sure = job->sure + (size_t)py * (size_t)width;
+        const float *fused = job->fused + (size_t)py * (size_t)width;
+        for (int px = x - RADIUS * stride; px <= x + RADIUS * stride; px += stride) {
+            if (px < 0 || px >= width || !sure[px])
                 continue;
-            const uint8_t *other = lumi_row_u8(&job->view->image, py) + 3 * px;
-            int difference = abs(own[0] - other[0]) + abs(own[1] - other[1]) + abs(own[2] - other[2]);
-            values[count] = job->fused[(size_t)py * (size_t)width + (size_t)px];
+            const uint8_t *other = colours + 3 * px;
+            const int difference = abs(own[0] - other[0]) + abs(own[1] - other[1]) + abs(own[2] - other[2]);
+            const float value = fused[px];
+            values[count] = value;
             says[count] = job->say[difference];
-            low = fminf(low, values[count]);
-            high = fmaxf(high, values[count]);
+            low = value < low ? value : low;
+            high = value > high ? value : high;
             total += says[count++];
         }
+    }
     if (count < 4)
         return fallback;
     const float scale = high > low ? (BINS - 1) / (high - low) : 0;
@@ -148,19 +164,30 @@ static float weighted_median(const struct refine_job *job, int x, int y, int str
     return fallback;
 }
 
-/* How much the depths within two pixels differ. */
-static float spread(const struct refine_job *job, int x, int y)
+/* How much the depths within two pixels differ, for each pixel of a row; low, high: scratch of the same length. */
+static void spread_row(const struct refine_job *job, int y, float *restrict low, float *restrict high,
+                       float *restrict spread)
 {
     const int width = job->view->grid->width, height = job->view->grid->height;
-    float low = INFINITY, high = -INFINITY;
+    const int top = y > 2 ? y - 2 : 0, bottom = y + 2 < height ? y + 2 : height - 1;
 
-    for (int j = y > 2 ? y - 2 : 0; j <= y + 2 && j < height; j++)
-        for (int i = x > 2 ? x - 2 : 0; i <= x + 2 && i < width; i++) {
-            float value = job->fused[(size_t)j * (size_t)width + (size_t)i];
-            low = fminf(low, value);
-            high = fmaxf(high, value);
+    memcpy(low, job->fused + (size_t)top * (size_t)width, (size_t)width * sizeof(float));
+    memcpy(high, low, (size_t)width * sizeof(float));
+    for (int j = top + 1; j <= bottom; j++) {
+        const float *row = job->fused + (size_t)j * (size_t)width;
+        for (int x = 0; x < width; x++) {
+            low[x] = row[x] < low[x] ? row[x] : low[x];
+            high[x] = row[x] > high[x] ? row[x] : high[x];
         }
-    return high - low;
+    }
+    for (int x = 0; x < width; x++) {
+        float lowest = low[x], highest = high[x];
+        for (int i = x > 2 ? x - 2 : 0; i <= x + 2 && i < width; i++) {
+            lowest = low[i] < lowest ? low[i] : lowest;
+            highest = high[i] > highest ? high[i] : highest;
+        }
+        spread[x] = highest - lowest;
+    }
 }
 
 static int filter_row(void *context, int y, int thread)
@@ -168,16 +195,21 @@ static int filter_row(void *context, int y, int thread)
     const struct refine_job *job = context;
     const int width = job->view->grid->width;
     float *result = lumi_row_f32(job->result, y);
+    float *spread = lumi_alloc(3 * (size_t)width, sizeof(float));
 
     (void)thread;
+    if (!spread)
+        return LUMI_ERR_NOMEM;
+    spread_row(job, y, spread + width, spread + 2 * width, spread);
     for (int x = 0; x < width; x++) {
         const size_t at = (size_t)y * (size_t)width + (size_t)x;
         result[x] = job->fused[at];
-        if (job->sure[at] && spread(job, x, y) <= EDGE_PX * job->tolerance)
+        if (job->sure[at] && spread[x] <= EDGE_PX * job->tolerance)
             continue;
         float wide = job->sure[at] ? job->fused[at] : weighted_median(job, x, y, 4, job->fused[at]);
         result[x] = weighted_median(job, x, y, 1, wide);
     }
+    lumi_free(spread);
     return LUMI_OK;
 }
 
@@ -192,8 +224,13 @@ int lumi_mvs_refine(const struct lumi_mvs_view *view, int count, const struct lu
         return lumi_fail(error, LUMI_ERR_ARG, "depth: %d neighbours, at most %d can be matched", count,
                          LUMI_MVS_NEIGHBOURS);
     LUMI_TRY(mvs_check(view, true, error));
-    for (int n = 0; n < count; n++) {
+    for (int n = 0; n < count; n++)
         LUMI_TRY(mvs_check(&neighbours[n], true, error));
+    job.confirmers = lumi_calloc((size_t)count + 1, sizeof(*job.confirmers));
+    code = LUMI_ERR_NOMEM;
+    if (!job.confirmers)
+        goto done;
+    for (int n = 0; n < count; n++) {
         init_confirmer(&job.confirmers[n], view, &neighbours[n]);
         job.tolerance = fminf(job.tolerance, job.confirmers[n].tolerance);
     }
@@ -209,6 +246,7 @@ int lumi_mvs_refine(const struct lumi_mvs_view *view, int count, const struct lu
     LUMI_GOTO(code, done, lumi_parallel_for(view->grid->height, threads, confirm_row, &job));
     LUMI_GOTO(code, done, lumi_parallel_for(view->grid->height, threads, filter_row, &job));
 done:
+    lumi_free(job.confirmers);
     lumi_free(job.fused);
     lumi_free(job.sure);
     if (code != LUMI_OK)

@@ -4,6 +4,7 @@
 #include "pipeline/depth/mvs_priv.h"
 #include "proto/base/parallel.h"
 
+#include <math.h>
 #include <string.h>
 
 struct volume_job {
@@ -41,6 +42,39 @@ static void init_ends(struct mvs_ends *ends, const struct mvs_target *target, co
     }
 }
 
+/* A pixel's ray, turned into a neighbour's frame. */
+static void turn(const struct mvs_target *target, float tan_x, float tan_y, float a[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const float *r = target->rotation + 3 * i;
+        a[i] = r[0] * tan_x + r[1] * tan_y + r[2];
+    }
+}
+
+/* The lines that the axes are over all the block's rays and planes: what a convex body is seen within is seen at its
+ * corners. */
+static void init_lines(struct mvs_ends *ends, const struct mvs_target *target, const struct mvs_image *image, int left,
+                       int right, int top, int bottom)
+{
+    float low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+
+    ends->column = ends->row = (struct mvs_line){false, 0, 0};
+    for (int i = 0; i < 8; i++) {
+        const int e = i & 4 ? ends->count - 1 : 0;
+        float a[3];
+        turn(target, image->tan_x[i & 1 ? right - 1 : left], image->tan_y[i & 2 ? bottom - 1 : top], a);
+        const float z = a[2] + ends->z[e], tangent[2] = {(a[0] + ends->x[e]) / z, (a[1] + ends->y[e]) / z};
+        if (!(z > 0))
+            return;
+        for (int axis = 0; axis < 2; axis++) {
+            low[axis] = fminf(low[axis], tangent[axis]);
+            high[axis] = fmaxf(high[axis], tangent[axis]);
+        }
+    }
+    ends->column = mvs_axis_line(&target->x, low[0], high[0]);
+    ends->row = mvs_axis_line(&target->y, low[1], high[1]);
+}
+
 /* A row of pixels of a block, neighbour by neighbour: what one pixel's sweep reads, the next one's mostly reads again.
  */
 struct block_row {
@@ -55,11 +89,9 @@ static void sweep_row(const struct volume_job *job, const struct mvs_ends *ends,
 
     for (int n = 0; n < job->count; n++) {
         const struct mvs_target *target = &job->targets[n];
-        const float *r = target->rotation;
         for (int x = left; x < right; x++) {
             float a[3];
-            for (int i = 0; i < 3; i++)
-                a[i] = r[3 * i] * image->tan_x[x] + r[3 * i + 1] * image->tan_y[y] + r[3 * i + 2];
+            turn(target, image->tan_x[x], image->tan_y[y], a);
             job->kernels->sweep(target, &ends[n], a, colours[x], row->cost[x - left][n]);
         }
     }
@@ -76,8 +108,10 @@ static void sweep_block(const struct volume_job *job, int row, int column, struc
     uint8_t group[MVS_GROUPS_MAX];
     const int groups = mvs_groups(block->groups, group);
 
-    for (int n = 0; n < job->count; n++)
+    for (int n = 0; n < job->count; n++) {
         init_ends(&ends[n], &job->targets[n], job->planes, groups, group);
+        init_lines(&ends[n], &job->targets[n], image, left, right, top, bottom);
+    }
     for (int y = top; y < bottom; y++) {
         uint8_t *result = job->volume + block->at + (size_t)(y - top) * MVS_BLOCK * (size_t)block->lanes;
         sweep_row(job, ends, left, right, y, costs);

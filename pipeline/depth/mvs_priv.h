@@ -25,6 +25,17 @@ struct mvs_axis {
     float a[MVS_AXIS_CELLS], b[MVS_AXIS_CELLS];
 };
 
+static inline float mvs_axis_position(const struct mvs_axis *axis, float tangent)
+{
+    if (axis->linear)
+        return axis->a[0] + axis->b[0] * tangent;
+    float cell = (tangent - axis->origin) * axis->scale;
+    cell = cell > 0 ? cell : 0; /* for a NaN too */
+    cell = cell < MVS_AXIS_CELLS - 1 ? cell : MVS_AXIS_CELLS - 1;
+    const int i = (int)cell;
+    return axis->a[i] + axis->b[i] * tangent;
+}
+
 /* A view ready for matching, at 1/divisor of its size. */
 struct mvs_image {
     int width, height;
@@ -73,6 +84,11 @@ struct mvs_level {
 /* LUMI_ERR_ARG for a view whose lens, pose or image (with `depth`, also its map) cannot be used. */
 int mvs_check(const struct lumi_mvs_view *view, bool depth, struct lumi_error *error);
 
+/* The axis of a grid whose tiles' edges lie at `tangents`, for a neighbour at 1/divisor of its size: pixel i's centre
+ * is at 2 · i. */
+void mvs_axis_init(struct mvs_axis *axis, const double *tangents, int tiles, int divisor);
+/* The straight line through the axis at two tangents, if it leaves the axis by little between. */
+struct mvs_line mvs_axis_line(const struct mvs_axis *axis, float low, float high);
 int mvs_image_init(struct mvs_image *image, const struct lumi_mvs_view *view, int divisor);
 void mvs_image_finish(struct mvs_image *image);
 int mvs_target_init(struct mvs_target *target, const struct lumi_mvs_view *view, const struct lumi_mvs_view *neighbour,
@@ -88,9 +104,16 @@ void mvs_search_finish(struct mvs_search *search);
 /* The groups in `bits`, ascending; returns how many. */
 int mvs_groups(uint32_t bits, uint8_t groups[MVS_GROUPS_MAX]);
 
+/* Where an axis is as good as straight: position = a + b · tangent. */
+struct mvs_line {
+    bool straight;
+    float a, b;
+};
+
 /* w · shift of the planes at which groups end, for one neighbour. Group i reaches from end[i] to the one after it;
- * groups that follow one another share an end. */
+ * groups that follow one another share an end. column, row: the neighbour's axes, as far as the block sees them. */
 struct mvs_ends {
+    struct mvs_line column, row;
     int groups, count; /* count: rounded up to a multiple of 8, the last one repeated */
     uint8_t end[MVS_GROUPS_MAX];
     float x[2 * MVS_GROUPS_MAX], y[2 * MVS_GROUPS_MAX], z[2 * MVS_GROUPS_MAX];

@@ -56,6 +56,8 @@ static void build_target(struct mvs_target *target, bool linear)
 static void build_ends(struct mvs_ends *ends, const struct mvs_target *target, bool gap)
 {
     *ends = (struct mvs_ends){.groups = PLANES / MVS_GROUP};
+    ends->column = (struct mvs_line){random_bits() & 1, 0.5f * (float)target->width, 0.4f * (float)target->width};
+    ends->row = (struct mvs_line){random_bits() & 1, 0.5f * (float)target->height, 0.4f * (float)target->height};
     for (int i = 0; i < ends->groups; i++) {
         ends->end[i] = (uint8_t)(i + (gap && i > 3));
         ends->count = ends->end[i] + 2;

@@ -4,8 +4,10 @@
 #include <immintrin.h>
 #include <math.h>
 
-static inline __m256 axis_position(const struct mvs_axis *axis, __m256 tangent)
+static inline __m256 position(const struct mvs_axis *axis, const struct mvs_line *line, __m256 tangent)
 {
+    if (line->straight)
+        return _mm256_add_ps(_mm256_set1_ps(line->a), _mm256_mul_ps(_mm256_set1_ps(line->b), tangent));
     if (axis->linear)
         return _mm256_add_ps(_mm256_set1_ps(axis->a[0]), _mm256_mul_ps(_mm256_set1_ps(axis->b[0]), tangent));
     __m256 cell = _mm256_mul_ps(_mm256_sub_ps(tangent, _mm256_set1_ps(axis->origin)), _mm256_set1_ps(axis->scale));
@@ -27,8 +29,8 @@ static inline int eight_ends(const struct mvs_target *target, const struct mvs_e
     scale = _mm256_blendv_ps(_mm256_set1_ps(NAN), scale, _mm256_cmp_ps(z, _mm256_setzero_ps(), _CMP_GT_OQ));
     __m256 tx = _mm256_mul_ps(_mm256_add_ps(a[0], _mm256_loadu_ps(ends->x + e)), scale);
     __m256 ty = _mm256_mul_ps(_mm256_add_ps(a[1], _mm256_loadu_ps(ends->y + e)), scale);
-    __m256 at_x = _mm256_add_ps(axis_position(&target->x, tx), half);
-    __m256 at_y = _mm256_add_ps(axis_position(&target->y, ty), half);
+    __m256 at_x = _mm256_add_ps(position(&target->x, &ends->column, tx), half);
+    __m256 at_y = _mm256_add_ps(position(&target->y, &ends->row, ty), half);
     _mm256_storeu_ps(x + e, at_x);
     _mm256_storeu_ps(y + e, at_y);
     __m256 inside = _mm256_cmp_ps(at_x, margin, _CMP_GE_OQ);
