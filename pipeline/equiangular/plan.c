@@ -6,15 +6,9 @@
 #include <math.h>
 
 #define DEGREE (LUMI_PI / 180)
-#define PINHOLE_FOV (75 * DEGREE)  /* narrower pinholes keep their pixels: their tangents hardly stretch */
+#define PINHOLE_FOV (75 * DEGREE) /* narrower pinholes keep their pixels: their tangents hardly stretch */
+#define NARROWEST_FOV (0.1 * DEGREE)
 #define LARGEST_FOV (150 * DEGREE) /* of a view: beyond it the tangents of the outer tiles grow without use */
-
-static bool same_lens(const struct lumi_lens *a, const struct lumi_lens *b)
-{
-    return a->model == b->model && a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
-           a->cx == b->cx && a->cy == b->cy && a->k1 == b->k1 && a->k2 == b->k2 && a->k3 == b->k3 && a->k4 == b->k4 &&
-           a->p1 == b->p1 && a->p2 == b->p2;
-}
 
 static bool plain_pinhole(const struct lumi_lens *lens)
 {
@@ -99,6 +93,12 @@ static int choose_fov(const struct lumi_lens *lenses, int count, double *fov_x, 
         if (low == high)
             break;
     }
+    if (!fixed_x && !fixed_y && low * fmin(x, y) < NARROWEST_FOV)
+        return lumi_fail(
+            error, LUMI_ERR_FORMAT,
+            "the images see no more than %.2g° × %.2g° about their lenses' axes: is the middle outside the "
+            "image, or the distortion too strong?",
+            low * x / DEGREE, low * y / DEGREE);
     if (low == 0)
         return lumi_fail(error, LUMI_ERR_ARG,
                          "the images do not cover a field of view of %.1f° × %.1f°; along their axes they cover "
@@ -153,7 +153,7 @@ int lumi_equiangular_choose(const struct lumi_lens *lenses, int count, enum lumi
     for (int i = 0; i < count; i++) {
         if (!lumi_lens_valid(&lenses[i]) || lenses[i].model == LUMI_LENS_EQUIRECTANGULAR)
             return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "views cannot be made from images with this lens");
-        keep = keep && plain_pinhole(&lenses[i]) && same_lens(&lenses[i], &lenses[0]);
+        keep = keep && plain_pinhole(&lenses[i]) && lumi_lens_equal(&lenses[i], &lenses[0]);
     }
     const struct lumi_lens *lens = &lenses[0];
     if (keep && projection == LUMI_PROJECTION_AUTO)
@@ -174,7 +174,7 @@ int lumi_equiangular_plan(struct lumi_run *run, struct lumi_error *error)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", run->capture);
     for (int i = 0; i < run->count; i++) {
         int k = count - 1;
-        while (k >= 0 && !same_lens(&lenses[k], &run->sources[i].lens))
+        while (k >= 0 && !lumi_lens_equal(&lenses[k], &run->sources[i].lens))
             k--;
         if (k < 0)
             lenses[count++] = run->sources[i].lens;

@@ -29,13 +29,6 @@ static char *relative_path(const char *folder, const char *file)
     return g_string_free(path, FALSE);
 }
 
-static bool same_lens(const struct lumi_lens *a, const struct lumi_lens *b)
-{
-    return a->model == b->model && a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
-           a->cx == b->cx && a->cy == b->cy && a->k1 == b->k1 && a->k2 == b->k2 && a->k3 == b->k3 && a->k4 == b->k4 &&
-           a->p1 == b->p1 && a->p2 == b->p2;
-}
-
 /* The lens as the source had it, if it still is the one the tree computes with. */
 static int describe_camera(struct lumi_capture *capture, const struct lumi_capture_frame *frame,
                            struct lumi_exchange_camera *camera, struct lumi_error *error)
@@ -49,7 +42,7 @@ static int describe_camera(struct lumi_capture *capture, const struct lumi_captu
     camera->parameter_count = stored.parameter_count;
     memcpy(camera->parameters, stored.parameters, sizeof stored.parameters);
     if (stored.parameter_count > 0 && lumi_exchange_lens(camera, frame->name, &lens, NULL) == LUMI_OK &&
-        same_lens(&lens, &stored.lens))
+        lumi_lens_equal(&lens, &stored.lens))
         return LUMI_OK;
     if (!lumi_exchange_describe_lens(&stored.lens, camera))
         return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "%s: frame '%s': a lens that the format cannot describe",

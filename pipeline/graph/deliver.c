@@ -11,20 +11,6 @@
 
 enum { BLOCK = 1 << 20 };
 
-static int write_all(int file, const char *data, size_t size, const char *name, struct lumi_error *error)
-{
-    while (size > 0) {
-        ssize_t written = write(file, data, size);
-        if (written < 0 && errno == EINTR)
-            continue;
-        if (written < 0)
-            return lumi_fail_errno(error, name, "write");
-        data += written;
-        size -= (size_t)written;
-    }
-    return LUMI_OK;
-}
-
 static int copy(int in, int out, const char *from, const char *to, struct lumi_error *error)
 {
     char *block = lumi_alloc(BLOCK, 1);
@@ -40,9 +26,11 @@ static int copy(int in, int out, const char *from, const char *to, struct lumi_e
             code = lumi_fail_errno(error, from, "read");
         if (count <= 0)
             break;
-        LUMI_GOTO(code, out, write_all(out, block, (size_t)count, to, error));
+        if (lumi_write_all(out, block, (size_t)count)) {
+            code = lumi_fail_errno(error, to, "write");
+            break;
+        }
     }
-out:
     lumi_free(block);
     return code;
 }

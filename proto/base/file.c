@@ -66,15 +66,17 @@ int lumi_file_read(const char *path, size_t limit, uint8_t **data, size_t *size,
 
 static atomic_uint names;
 
-static int write_all(int fd, const uint8_t *data, size_t size)
+int lumi_write_all(int fd, const void *data, size_t size)
 {
+    const uint8_t *at = data;
+
     while (size > 0) {
-        ssize_t put = write(fd, data, size);
+        ssize_t put = write(fd, at, size);
         if (put < 0 && errno == EINTR)
             continue;
         if (put < 0)
             return -1;
-        data += put;
+        at += put;
         size -= (size_t)put;
     }
     return 0;
@@ -204,7 +206,7 @@ int lumi_file_write(const char *path, const void *data, size_t size, bool sync, 
     struct lumi_new_file file;
 
     LUMI_TRY(lumi_new_file_open(&file, path, error));
-    int code = write_all(file.fd, data, size) ? lumi_fail_errno(error, path, "cannot write") : LUMI_OK;
+    int code = lumi_write_all(file.fd, data, size) ? lumi_fail_errno(error, path, "cannot write") : LUMI_OK;
     return lumi_new_file_close(&file, code, sync, error);
 }
 

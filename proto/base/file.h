@@ -16,6 +16,9 @@ extern "C" {
  * zero byte stands after its end, so that text can be parsed in place. */
 int lumi_file_read(const char *path, size_t limit, uint8_t **data, size_t *size, struct lumi_error *error);
 
+/* write(2) until all is written. −1 with errno set where that cannot be. */
+int lumi_write_all(int fd, const void *data, size_t size);
+
 /* A file that appears under its name when it is whole: written as "<path>.tmp-<process>-<count>", which is locked
  * (flock) until then. */
 struct lumi_new_file {

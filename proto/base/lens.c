@@ -178,6 +178,13 @@ bool lumi_lens_valid(const struct lumi_lens *l)
            l->height <= LUMI_RASTER_MAX && l->model >= LUMI_LENS_BROWN && l->model <= LUMI_LENS_EQUIRECTANGULAR;
 }
 
+bool lumi_lens_equal(const struct lumi_lens *a, const struct lumi_lens *b)
+{
+    return a->model == b->model && a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
+           a->cx == b->cx && a->cy == b->cy && a->k1 == b->k1 && a->k2 == b->k2 && a->k3 == b->k3 && a->k4 == b->k4 &&
+           a->p1 == b->p1 && a->p2 == b->p2;
+}
+
 void lumi_lens_init_pinhole(struct lumi_lens *lens, int width, int height, double fov_x)
 {
     double f = width / 2.0 / tan(fov_x / 2);

@@ -37,6 +37,9 @@ bool lumi_lens_unproject(const struct lumi_lens *lens, double x, double y, struc
 /* Finite, positive focal lengths, size in 1..LUMI_RASTER_MAX, a known model. */
 bool lumi_lens_valid(const struct lumi_lens *lens);
 
+/* Equal in every number. */
+bool lumi_lens_equal(const struct lumi_lens *a, const struct lumi_lens *b);
+
 /* Pinhole with the given horizontal field of view (radians), square pixels, centred. */
 void lumi_lens_init_pinhole(struct lumi_lens *lens, int width, int height, double fov_x);
 

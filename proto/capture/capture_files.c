@@ -1,4 +1,5 @@
 /* Files on the disk: written whole or not at all, synced, and put in order after a crash. */
+#include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/capture/capture_priv.h"
 
@@ -13,22 +14,6 @@
 #include <unistd.h>
 
 #define COPY_BUFFER ((size_t)1 << 18)
-
-static int write_all(int fd, const void *data, size_t size)
-{
-    const char *at = data;
-
-    while (size > 0) {
-        ssize_t done = write(fd, at, size);
-        if (done < 0 && errno == EINTR)
-            continue;
-        if (done < 0)
-            return -1;
-        at += done;
-        size -= (size_t)done;
-    }
-    return 0;
-}
 
 void capture_digest_hex(struct sha256_ctx *context, char hex[65])
 {
@@ -98,7 +83,7 @@ int capture_write_file(struct lumi_capture *capture, const char *name, const voi
     fd = openat(capture->dir_fd, temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
         return lumi_fail_errno(error, shown, "create");
-    if (write_all(fd, data, size) < 0 || fsync(fd) < 0)
+    if (lumi_write_all(fd, data, size) < 0 || fsync(fd) < 0)
         code = lumi_fail_errno(error, shown, "write");
     if (close(fd) < 0 && code == LUMI_OK)
         code = lumi_fail_errno(error, shown, "close");
@@ -187,7 +172,7 @@ static int copy_content(const struct content *content, int to, const char *shown
     if (!content->path) {
         sha256_update(&hash, content->size, content->data);
         stored->bytes = (int64_t)content->size;
-        if (write_all(to, content->data, content->size) < 0)
+        if (lumi_write_all(to, content->data, content->size) < 0)
             code = lumi_fail_errno(error, shown, "write");
         capture_digest_hex(&hash, stored->sha256);
         return code;
@@ -213,7 +198,7 @@ static int copy_content(const struct content *content, int to, const char *shown
             break;
         sha256_update(&hash, (size_t)got, (const uint8_t *)buffer);
         stored->bytes += got;
-        if (write_all(to, buffer, (size_t)got) < 0) {
+        if (lumi_write_all(to, buffer, (size_t)got) < 0) {
             code = lumi_fail_errno(error, shown, "write");
             goto done;
         }

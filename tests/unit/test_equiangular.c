@@ -93,6 +93,22 @@ static void cameras_with_different_lenses_share_what_all_cover(void **state)
         }
 }
 
+static void lenses_that_see_nothing_straight_ahead_are_bad_input(void **state)
+{
+    struct lumi_lens folded = fisheye(1280, 1024, 110 * DEGREE), aside = folded;
+    struct lumi_grid grid;
+    struct lumi_error error;
+
+    (void)state;
+    folded.model = LUMI_LENS_BROWN;
+    folded.k1 = -1e12;
+    aside.cx = -300;
+    assert_int_equal(lumi_equiangular_choose(&folded, 1, LUMI_PROJECTION_AUTO, 0, 0, 0, &grid, &error),
+                     LUMI_ERR_FORMAT);
+    assert_int_equal(lumi_equiangular_choose(&aside, 1, LUMI_PROJECTION_AUTO, 0, 0, 0, &grid, &error), LUMI_ERR_FORMAT);
+    assert_non_null(strstr(error.text, "outside the image"));
+}
+
 static void a_field_of_view_nobody_photographed_is_refused(void **state)
 {
     const struct lumi_lens lens = fisheye(1280, 1024, 110 * DEGREE);
@@ -200,6 +216,7 @@ int main(void)
         cmocka_unit_test(a_narrow_pinhole_keeps_its_pixels),
         cmocka_unit_test(fisheyes_become_equiangular_views_as_wide_as_they_see),
         cmocka_unit_test(cameras_with_different_lenses_share_what_all_cover),
+        cmocka_unit_test(lenses_that_see_nothing_straight_ahead_are_bad_input),
         cmocka_unit_test(a_field_of_view_nobody_photographed_is_refused),
         cmocka_unit_test(resampling_finds_every_direction_again),
         cmocka_unit_test(a_coarser_view_averages_instead_of_aliasing),
