@@ -212,6 +212,20 @@ static int cameras_text(char *text, const char *name, GHashTable *table, struct 
     return LUMI_OK;
 }
 
+/* An image's points are three numbers each, or none. Where their lines were left out, every second image would be taken
+ * for the points of the one before it. */
+static bool is_points(char *line)
+{
+    int count = 0;
+
+    for (char *word, *end; (word = next_word(&line)) != NULL; count++) {
+        g_ascii_strtod(word, &end);
+        if (*end)
+            return false;
+    }
+    return count % 3 == 0;
+}
+
 static int images_text(char *text, const char *name, GHashTable *table, struct lumi_exchange *exchange,
                        struct lumi_error *error)
 {
@@ -226,7 +240,10 @@ static int images_text(char *text, const char *name, GHashTable *table, struct l
         if (!good || !next_id(&line, &camera))
             return lumi_fail(error, LUMI_ERR_FORMAT, "%s: a line that describes no image", name);
         LUMI_TRY(keep_image(numbers, camera, g_strstrip(line), name, table, exchange, error));
-        next_line(&text); /* its points */
+        char *points = next_line(&text);
+        if (points && !is_points(points))
+            return lumi_fail(error, LUMI_ERR_FORMAT, "%s: image %u has no line of points (it may be empty)", name,
+                             number);
     }
     return LUMI_OK;
 }

@@ -1,8 +1,9 @@
 /* transforms.json: nerfstudio's data format, also as instant-ngp and Blender scripts write it.
  *
  * Fields used, at the top or in a frame (a frame's own wins): camera_model, w, h, fl_x, fl_y, cx, cy, k1..k4, p1, p2,
- * camera_angle_x. In a frame: file_path, transform_matrix, and our row and col. All others are ignored, among them
- * applied_transform and applied_scale, which tell how the poses were brought to where they are. */
+ * camera_angle_x; is_fisheye, instant-ngp's word for OPENCV_FISHEYE. In a frame: file_path, transform_matrix, and our
+ * row and col. All others are ignored, among them applied_transform and applied_scale, which tell how the poses were
+ * brought to where they are. */
 #include "pipeline/exchange/exchange.h"
 
 #include "pipeline/exchange/json_check.h"
@@ -29,6 +30,12 @@ static bool is_number(JsonNode *node)
 {
     return node && JSON_NODE_HOLDS_VALUE(node) &&
            (json_node_get_value_type(node) == G_TYPE_INT64 || json_node_get_value_type(node) == G_TYPE_DOUBLE);
+}
+
+static bool is_true(JsonNode *node)
+{
+    return node && JSON_NODE_HOLDS_VALUE(node) && json_node_get_value_type(node) == G_TYPE_BOOLEAN &&
+           json_node_get_boolean(node);
 }
 
 static int get_number(const struct fields *fields, const char *key, const char *what, bool *there, double *value,
@@ -134,6 +141,8 @@ static int read_camera(const struct fields *fields, const char *what, struct lum
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: 'camera_model' is not a text", what);
     if (node)
         given = json_node_get_string(node);
+    else if (is_true(find(fields, "is_fisheye")))
+        given = "OPENCV_FISHEYE";
     for (int i = 0; i < NUMBERS; i++)
         LUMI_TRY(get_number(fields, keys[i], what, &there[i], &v[i], error));
     const struct lumi_exchange_model *model = lumi_exchange_model_by_name(given[0] ? given : "PINHOLE");

@@ -64,6 +64,10 @@ static void lens_models_of_transforms_become_ours(void **state)
                      LUMI_OK);
     assert_int_equal(lumi_exchange_lens(lumi_exchange_camera(&list, 0), "x", &lens, &error), LUMI_OK);
     assert_true(lens.model == LUMI_LENS_FISHEYE && lens.k1 == 0.1 && lens.k4 == 0.4);
+    assert_int_equal(parse("{\"is_fisheye\":true,\"k1\":0.1,\"k4\":0.4," CAMERA "\"frames\":[" FRAME("", UNIT) "]}"),
+                     LUMI_OK); /* as instant-ngp says it */
+    assert_int_equal(lumi_exchange_lens(lumi_exchange_camera(&list, 0), "x", &lens, &error), LUMI_OK);
+    assert_true(lens.model == LUMI_LENS_FISHEYE && lens.k1 == 0.1 && lens.k4 == 0.4);
     assert_int_equal(parse("{\"k1\":0.01,\"k3\":0.03,\"p2\":0.002," CAMERA "\"frames\":[" FRAME("", UNIT) "]}"),
                      LUMI_OK);
     assert_int_equal(lumi_exchange_lens(lumi_exchange_camera(&list, 0), "x", &lens, &error), LUMI_OK);
@@ -109,6 +113,7 @@ static void bad_transforms_are_refused_with_one_line(void **state)
          "scales"},
         {"{" CAMERA "\"frames\":[" FRAME("", "[[1,0,0],[0,1,0],[0,0,1]]") "]}", LUMI_ERR_FORMAT, "4 numbers"},
         {"{\"w\":100,\"h\":80,\"fl_x\":0,\"frames\":[" FRAME("", UNIT) "]}", LUMI_ERR_FORMAT, "focal length"},
+        {"{" CAMERA "\"frames\":[" FRAME("\"row\":-2,", UNIT) "]}", LUMI_ERR_FORMAT, "'row' is not a whole number"},
         {"{\"w\":100.5,\"h\":80,\"fl_x\":50,\"frames\":[" FRAME("", UNIT) "]}", LUMI_ERR_FORMAT, "whole"},
     };
 
@@ -284,6 +289,10 @@ static void bad_colmap_models_are_refused_with_one_line(void **state)
         {"1 PINHOLE 9 9 9 9 4 4\n", "1 1 0 0 0 0 inf 0 1 a.jpg\n\n", LUMI_ERR_FORMAT, "not finite"},
         {"1 PINHOLE 9 9 9 9 4 4\n", "1 1 0 0 0 0 0 1 a.jpg\n\n", LUMI_ERR_FORMAT, "no image"},
         {"1 PINHOLE 9 9 9 9 4 4\n", "1 1 0 0 0 0 0 0 1\n\n", LUMI_ERR_FORMAT, "without a name"},
+        {"1 PINHOLE 9 9 9 9 4 4\n", "1 1 0 0 0 0 0 0 1 a.jpg\n2 1 0 0 0 0 0 0 1 b.jpg\n", LUMI_ERR_FORMAT,
+         "image 1 has no line of points"},
+        {"1 PINHOLE 9 9 9 9 4 4\n", "1 1 0 0 0 0 0 0 1 a.jpg\n3.5 4.5 -1 7\n", LUMI_ERR_FORMAT,
+         "image 1 has no line of points"},
     };
 
     (void)state;
