@@ -8,6 +8,7 @@
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
 #include "proto/lightfield/field.h"
+#include "proto/lightfield/mesh_raster.h"
 #include "proto/lightfield/yuv.h"
 
 #include <glib.h>
@@ -82,7 +83,9 @@ static int export_field_view(const struct lumi_export_view *export, const struct
     int code = LUMI_OK;
 
     if (export->depth) {
-        LUMI_GOTO(code, out, lumi_mesh_rasterise(grid, mesh, &depth, error));
+        code = lumi_mesh_rasterize(mesh, grid->width, grid->height, &depth);
+        if (code != LUMI_OK)
+            LUMI_GOTO(code, out, lumi_fail(error, code, "%s: no memory for the depth of a view", export->source));
         LUMI_GOTO(code, out, lumi_export_depth(export->depth, &depth, error));
     }
     if (export->mesh) {

@@ -23,54 +23,6 @@ static struct corner corner_of(const struct lumi_view_mesh *mesh, int tile, cons
     return c;
 }
 
-/* Within a tile the lens is rectilinear, so inverse depth is linear in the image. Edges count as inside on both sides:
- * the two triangles agree there. */
-static void fill_triangle(const struct corner c[3], const struct lumi_raster *out)
-{
-    double area = (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x);
-
-    if (area == 0)
-        return;
-    int x0 = (int)fmax(0, ceil(fmin(fmin(c[0].x, c[1].x), c[2].x) - 0.5));
-    int y0 = (int)fmax(0, ceil(fmin(fmin(c[0].y, c[1].y), c[2].y) - 0.5));
-    int x1 = (int)fmin(out->width - 1, floor(fmax(fmax(c[0].x, c[1].x), c[2].x) - 0.5));
-    int y1 = (int)fmin(out->height - 1, floor(fmax(fmax(c[0].y, c[1].y), c[2].y) - 0.5));
-    for (int y = y0; y <= y1; y++)
-        for (int x = x0; x <= x1; x++) {
-            double px = x + 0.5, py = y + 0.5;
-            double a = ((c[1].x - px) * (c[2].y - py) - (c[1].y - py) * (c[2].x - px)) / area;
-            double b = ((c[2].x - px) * (c[0].y - py) - (c[2].y - py) * (c[0].x - px)) / area;
-            if (a < -1e-9 || b < -1e-9 || a + b > 1 + 1e-9)
-                continue;
-            float w = (float)(a * c[0].w + b * c[1].w + (1 - a - b) * c[2].w);
-            float *there = &lumi_row_f32(out, y)[x];
-            if (!(*there >= w)) /* nearer, or nothing yet */
-                *there = w;
-        }
-}
-
-int lumi_mesh_rasterise(const struct lumi_grid *grid, const struct lumi_view_mesh *mesh,
-                        struct lumi_raster *inverse_depth, struct lumi_error *error)
-{
-    int code = lumi_raster_create(inverse_depth, grid->width, grid->height, 1, LUMI_F32);
-
-    if (code != LUMI_OK)
-        return lumi_fail(error, code, "no memory for %dx%d pixels of depth", grid->width, grid->height);
-    for (int y = 0; y < grid->height; y++)
-        for (int x = 0; x < grid->width; x++)
-            lumi_row_f32(inverse_depth, y)[x] = NAN;
-    for (int i = 0; i < mesh->cols * mesh->rows; i++) {
-        const struct lumi_tile_mesh *tile = &mesh->tiles[i];
-        for (int t = 0; t < tile->triangle_count; t++) {
-            struct corner c[3];
-            for (int k = 0; k < 3; k++)
-                c[k] = corner_of(mesh, i, &tile->vertices[tile->indices[3 * t + k]]);
-            fill_triangle(c, inverse_depth);
-        }
-    }
-    return LUMI_OK;
-}
-
 int lumi_export_depth(const char *path, const struct lumi_raster *inverse_depth, struct lumi_error *error)
 {
     struct lumi_image_options options;

@@ -7,11 +7,6 @@
 #include "proto/lightfield/grid.h"
 #include "proto/lightfield/mesh.h"
 
-/* The inverse depth (1 channel F32, grid-sized) of a view's mesh at every pixel centre, the nearest surface where
- * several lie behind one another; NaN where there is none. */
-int lumi_mesh_rasterise(const struct lumi_grid *grid, const struct lumi_view_mesh *mesh,
-                        struct lumi_raster *inverse_depth, struct lumi_error *error);
-
 /* An OpenEXR file with one float channel "Z": metres along the optical axis, infinity where the inverse depth is 0 or
  * less, NaN where it is NaN. */
 int lumi_export_depth(const char *path, const struct lumi_raster *inverse_depth, struct lumi_error *error);

@@ -22,9 +22,6 @@ int lumi_simplify(const struct lumi_raster *inverse_depth, const struct lumi_ras
                   const struct lumi_grid *grid, const struct lumi_simplify_options *options,
                   struct lumi_view_mesh *mesh, struct lumi_error *error);
 
-/* The dense inverse depth that the meshes stand for: 1 channel F32, width × height, made. */
-int lumi_mesh_rasterize(const struct lumi_view_mesh *mesh, int width, int height, struct lumi_raster *inverse_depth);
-
 /* Inverse depth at half resolution: of the four pixels around each new one's centre the second nearest, so that edges
  * stay steps and things two pixels wide stay. `half`, as lumi_grid_init_half made it from `grid`. */
 int lumi_halve_inverse_depth(const struct lumi_raster *inverse_depth, const struct lumi_grid *grid,

@@ -1,6 +1,7 @@
 /* pipeline/geometry: meshes from depth maps. */
 #include "pipeline/geometry/simplify.h"
 #include "proto/base/memory.h"
+#include "proto/lightfield/mesh_raster.h"
 
 #include <math.h>
 #include <setjmp.h>

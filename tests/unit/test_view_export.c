@@ -3,6 +3,7 @@
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
+#include "proto/lightfield/mesh_raster.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -46,7 +47,7 @@ static void a_mesh_becomes_the_depth_it_describes(void **state)
     (void)state;
     close(mkstemp(path));
     make_mesh(&grid, &mesh);
-    assert_int_equal(lumi_mesh_rasterise(&grid, &mesh, &inverse, &error), LUMI_OK);
+    assert_int_equal(lumi_mesh_rasterize(&mesh, grid.width, grid.height, &inverse), LUMI_OK);
     assert_int_equal(inverse.width, 128);
     for (int y = 0; y < 64; y++)
         for (int x = 0; x < 128; x++)
@@ -90,7 +91,7 @@ static void nearer_surfaces_hide_farther_ones(void **state)
     /* The second triangle of the first tile now covers the same place as the first, at one depth. */
     const uint16_t again[3] = {0, 1, 2};
     memcpy(lumi_mesh_indices(&mesh, 0) + 3, again, sizeof again);
-    assert_int_equal(lumi_mesh_rasterise(&grid, &mesh, &inverse, &error), LUMI_OK);
+    assert_int_equal(lumi_mesh_rasterize(&mesh, grid.width, grid.height, &inverse), LUMI_OK);
     assert_true(isnan(lumi_row_f32(&inverse, 60)[60]));
     assert_true(fabsf(lumi_row_f32(&inverse, 3)[3] - 7.0f / 512) < 1e-6f);
     lumi_raster_finish(&inverse);
