@@ -268,7 +268,7 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
 const struct lumi_stage lumi_stage_compress = {
     .name = "compress",
     .title = "compress",
-    .version = 1,
+    .version = 2,
     .extension = ".lumi",
     .whole = true,
     .serial = true,

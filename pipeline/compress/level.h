@@ -12,6 +12,7 @@ struct compress_quality {
     int tile_quantizer, reference_quantizer; /* 0..63 */
     int speed;                               /* libvpx's cpu-used */
     int range;                               /* of the shift search, pixels */
+    int own_weight;                          /* of reference images when they are filtered; 0: they are not */
 };
 
 void compress_quality_init(struct compress_quality *quality, int value);

@@ -1,11 +1,12 @@
 /* Finding where in the reference image a tile's content is. */
 #include "proto/base/memory.h"
+#include "proto/lightfield/block_difference.h"
 #include "proto/lightfield/tile_encoder.h"
 
 #include <limits.h>
 #include <stdlib.h>
 
-enum { BLOCK = 16, BLOCKS = LUMI_TILE / BLOCK, BLOCK_COUNT = BLOCKS * BLOCKS, RANGE_MAX = 64 };
+enum { BLOCK = LUMI_DIFFERENCE_BLOCK, BLOCKS = LUMI_TILE / BLOCK, BLOCK_COUNT = BLOCKS * BLOCKS, RANGE_MAX = 64 };
 enum { PATCH = LUMI_TILE + 2 * RANGE_MAX };
 
 /* The luma around the tile's seeded place, so that candidates need no clamping. */
@@ -26,14 +27,7 @@ static void block_differences(const uint8_t *source, const uint8_t *patch, uint1
     for (int b = 0; b < BLOCK_COUNT; b++) {
         const uint8_t *p = source + b / BLOCKS * BLOCK * LUMI_TILE + b % BLOCKS * BLOCK;
         const uint8_t *q = patch + b / BLOCKS * BLOCK * PATCH + b % BLOCKS * BLOCK;
-        unsigned sum = 0;
-        for (int y = 0; y < BLOCK; y++, p += LUMI_TILE, q += PATCH) {
-            unsigned row = 0;
-            for (int x = 0; x < BLOCK; x++)
-                row += (unsigned)abs(p[x] - q[x]);
-            sum += row;
-        }
-        sums[b] = (uint16_t)sum; /* 256 pixels of at most 255 */
+        sums[b] = (uint16_t)lumi_block_difference(p, LUMI_TILE, q, PATCH); /* 256 pixels of at most 255 */
     }
 }
 

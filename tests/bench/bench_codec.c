@@ -1,14 +1,18 @@
 /* Bytes of the tile codec against WebP and a VP9 video of the same images, at equal PSNR (Overbeck et al. 2018, section
  * 8.2: over the three planes of YUV 4:2:0), and tiles decoded a second.
  *
- *   bench_codec [--half] COLUMNS RANGE FILE...
+ *   bench_codec [--crop WxH] [--scale WxH] [--quantizers A,B,...] [--speed CPU-USED] [--neighbours N] COLUMNS RANGE
+ *       FILE...
  *
  * The files are images of one size from cameras on a grid of COLUMNS columns, row by row: also the video's order, back
  * and forth. RANGE: of the shift search, pixels. All bytes of the level are counted: reference images, priming, side
  * information, tiles. WebP gets the planes as they are (method 6); so does the video (two seconds a key frame at most
  * are not asked for: one stream). Their bytes at our PSNR are interpolated between neighbouring qualities.
- * --half: images of half the width and height, means of four pixels. */
+ * --crop: so much out of the middle of every image; --scale: then averaged to this size, which may squeeze it.
+ * --quantizers: the tiles' (0..63), a row each. --neighbours: that reference images are filtered with (12; 0: none).
+ * The time of encoding is that of the thread, with shifts, training, filter and reference images. */
 #include "pipeline/compress/cluster.h"
+#include "pipeline/compress/reference_filter.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
 #include "proto/lightfield/cluster_code.h"
@@ -31,8 +35,10 @@ struct point {
 };
 
 struct bench {
-    int count, columns, range, quantizer;
-    struct lumi_yuv *images, *references;
+    int count, columns, range, quantizer, speed;
+    int neighbours; /* that reference images are filtered with */
+    struct lumi_yuv *images;
+    struct lumi_yuv *sources, *references; /* filtered, then decoded reference images */
     struct lumi_clusters clusters;
     struct lumi_grid grids[LUMI_LEVELS];
     struct lumi_field_view *views;
@@ -161,7 +167,7 @@ static struct point video(const struct bench *bench, unsigned quantizer)
     vpx_codec_enc_cfg_t config;
     vpx_codec_ctx_t encoder;
     vpx_image_t wrapped;
-    double sums[2] = {0, 0}; /* bytes, squared error */
+    double sums[2] = {0, 0}, before; /* bytes, squared error */
 
     vpx_codec_enc_config_default(vpx_codec_vp9_cx(), &config, 0);
     config.g_w = (unsigned)bench->images[0].width;
@@ -185,8 +191,13 @@ static struct point video(const struct bench *bench, unsigned quantizer)
             exit(1);
         take_packets(&encoder, sums);
     }
-    vpx_codec_encode(&encoder, NULL, -1, 1, 0, VPX_DL_GOOD_QUALITY);
-    take_packets(&encoder, sums);
+    /* An encode call hands out no more than its buffer holds. */
+    do {
+        before = sums[0];
+        if (vpx_codec_encode(&encoder, NULL, -1, 1, 0, VPX_DL_GOOD_QUALITY) != VPX_CODEC_OK)
+            exit(1);
+        take_packets(&encoder, sums);
+    } while (sums[0] > before);
     vpx_codec_destroy(&encoder);
     return (struct point){psnr(bench, sums[1]), sums[0] / bench->count};
 }
@@ -218,8 +229,8 @@ static int references(void *context, int level, int run, uint32_t *sizes, struct
     int count = 0, first = run * LUMI_REFERENCE_RUN;
 
     for (; count < LUMI_REFERENCE_RUN && first + count < bench->clusters.count; count++)
-        sources[count] = bench->images[bench->clusters.members[bench->clusters.first[first + count]]];
-    return lumi_references_encode(sources, count, bench->quantizer / 3, 2, sizes, bytes, error);
+        sources[count] = bench->sources[first + count];
+    return lumi_references_encode(sources, count, bench->quantizer / 3, bench->speed, sizes, bytes, error);
 }
 
 static int cluster(void *context, int level, int index, struct lumi_writer *bytes, struct lumi_error *error)
@@ -229,6 +240,37 @@ static int cluster(void *context, int level, int index, struct lumi_writer *byte
     (void)level, (void)error;
     lumi_write_bytes(bytes, bench->coded[index].data, bench->coded[index].size);
     return LUMI_OK;
+}
+
+/* Those of a cluster nearest its reference image. */
+static int choose_others(const struct bench *bench, int cluster, struct lumi_filter_view *others)
+{
+    const int *members = bench->clusters.members + bench->clusters.first[cluster], columns = bench->columns;
+    const int size = bench->clusters.first[cluster + 1] - bench->clusters.first[cluster];
+    int count = 0;
+
+    for (int distance = 1; distance < 2 * columns * columns; distance++)
+        for (int i = 1; i < size && count < bench->neighbours; i++) {
+            int x = members[i] % columns - members[0] % columns, y = members[i] / columns - members[0] / columns;
+            if (x * x + y * y == distance)
+                others[count++] = (struct lumi_filter_view){&bench->images[members[i]], NULL};
+        }
+    return count;
+}
+
+static void filter_references(struct bench *bench)
+{
+    const int own_weight = lumi_filter_own_weight(bench->quantizer);
+    struct lumi_filter_view others[LUMI_FILTER_OTHERS_MAX];
+    struct lumi_error error;
+
+    for (int i = 0; i < bench->clusters.count; i++) {
+        const struct lumi_yuv *reference = &bench->images[bench->clusters.members[bench->clusters.first[i]]];
+        int count = own_weight > 0 ? choose_others(bench, i, others) : 0;
+        must(lumi_reference_filter(reference, others, count, bench->range, own_weight > 0 ? own_weight : 1,
+                                   &bench->sources[i], &error),
+             &error);
+    }
 }
 
 static void decode_references(struct bench *bench)
@@ -328,15 +370,16 @@ static void decode_at_random(const struct lumi_writer *file, const struct bench 
 static void measure(struct bench *bench, int quantizer, const struct point *webps, const struct point *videos,
                     int points)
 {
-    const struct lumi_tile_encoder_settings settings = {.quantizer = quantizer, .speed = 2};
+    const struct lumi_tile_encoder_settings settings = {.quantizer = quantizer, .speed = bench->speed};
     struct lumi_tile_encoder *encoder;
     struct lumi_writer file;
     struct lumi_error error;
     double rate, side, bytes, before;
 
     bench->quantizer = quantizer;
-    decode_references(bench);
     before = seconds();
+    filter_references(bench);
+    decode_references(bench);
     train(bench);
     must(lumi_tile_encoder_create(&settings, bench->training, bench->training_count, bench->references, &encoder,
                                   &error),
@@ -371,38 +414,65 @@ static void measure(struct bench *bench, int quantizer, const struct point *webp
     for (int i = 0; i < bench->clusters.count; i++) {
         lumi_writer_finish(&bench->coded[i]);
         lumi_yuv_finish(&bench->references[i]);
+        lumi_yuv_finish(&bench->sources[i]);
     }
     lumi_writer_finish(&file);
     lumi_tile_encoder_destroy(encoder);
     lumi_free(bench->training);
 }
 
-/* 8 bits; with `half` the mean of every four pixels. */
-static void read_image(const char *file, bool half, struct lumi_raster *image)
+/* How the files' pixels become images: cut out of the middle, or averaged. */
+struct shape {
+    int crop_width, crop_height, width, height; /* 0: as it is */
+};
+
+/* The mean over the rectangle of the source that a pixel covers. */
+static void average(const struct lumi_raster *from, struct lumi_raster *to)
+{
+    const double step_x = (double)from->width / to->width, step_y = (double)from->height / to->height;
+
+    for (int y = 0; y < to->height; y++)
+        for (int x = 0; x < to->width; x++) {
+            double sum[3] = {0, 0, 0}, weight = 0;
+            for (int v = (int)(y * step_y); v < from->height && v < (y + 1) * step_y; v++)
+                for (int u = (int)(x * step_x); u < from->width && u < (x + 1) * step_x; u++) {
+                    double w = (fmin(u + 1, (x + 1) * step_x) - fmax(u, x * step_x)) *
+                               (fmin(v + 1, (y + 1) * step_y) - fmax(v, y * step_y));
+                    const uint8_t *pixel = lumi_row_u8(from, v) + 3 * u;
+                    for (int c = 0; c < 3; c++)
+                        sum[c] += w * pixel[c];
+                    weight += w;
+                }
+            for (int c = 0; c < 3; c++)
+                lumi_row_u8(to, y)[3 * x + c] = (uint8_t)(sum[c] / weight + 0.5);
+        }
+}
+
+static void read_image(const char *file, const struct shape *shape, struct lumi_raster *image)
 {
     struct lumi_error error;
-    struct lumi_raster raw, whole;
+    struct lumi_raster raw, whole, part;
 
     must(lumi_image_read(file, 3, &raw, NULL, &error), &error);
-    if (lumi_raster_convert(&raw, LUMI_U8, half ? &whole : image) != LUMI_OK)
+    if (lumi_raster_convert(&raw, LUMI_U8, &whole) != LUMI_OK)
         exit(1);
     lumi_raster_finish(&raw);
-    if (!half)
-        return;
-    if (lumi_raster_create(image, whole.width / 2, whole.height / 2, 3, LUMI_U8) != LUMI_OK)
+    int width = shape->crop_width ? shape->crop_width : whole.width;
+    int height = shape->crop_height ? shape->crop_height : whole.height;
+    int left = (whole.width - width) / 2, top = (whole.height - height) / 2;
+    if (left < 0 || top < 0 || lumi_raster_create(&part, width, height, 3, LUMI_U8) != LUMI_OK ||
+        lumi_raster_create(image, shape->width ? shape->width : width, shape->height ? shape->height : height, 3,
+                           LUMI_U8) != LUMI_OK)
         exit(1);
-    for (int y = 0; y < image->height; y++) {
-        const uint8_t *a = lumi_row_u8(&whole, 2 * y), *b = lumi_row_u8(&whole, 2 * y + 1);
-        for (int x = 0; x < image->width; x++)
-            for (int c = 0; c < 3; c++) {
-                int at = 6 * x + c;
-                lumi_row_u8(image, y)[3 * x + c] = (uint8_t)((a[at] + a[at + 3] + b[at] + b[at + 3] + 2) / 4);
-            }
-    }
+    for (int y = 0; y < height; y++)
+        memcpy(lumi_row_u8(&part, y), lumi_row_u8(&whole, top + y) + (size_t)3 * (size_t)left,
+               (size_t)3 * (size_t)width);
+    average(&part, image);
+    lumi_raster_finish(&part);
     lumi_raster_finish(&whole);
 }
 
-static void load(struct bench *bench, char **files, bool half)
+static void load(struct bench *bench, char **files, const struct shape *shape)
 {
     struct lumi_pose *poses = lumi_calloc((size_t)bench->count, sizeof *poses);
     struct lumi_error error;
@@ -413,7 +483,7 @@ static void load(struct bench *bench, char **files, bool half)
         exit(1);
     for (int i = 0; i < bench->count; i++) {
         struct lumi_raster raster;
-        read_image(files[i], half, &raster);
+        read_image(files[i], shape, &raster);
         must(lumi_yuv_from_raster(&raster, &bench->images[i]), &error);
         lumi_raster_finish(&raster);
         poses[i] = (struct lumi_pose){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {i % bench->columns, i / bench->columns, 0}};
@@ -426,37 +496,72 @@ static void load(struct bench *bench, char **files, bool half)
     for (int i = 0; i < LUMI_LEVELS; i++)
         lumi_grid_init_pinhole(&bench->grids[i], bench->images[0].width, bench->images[0].height, 1000, 1000, 0, 0);
     bench->references = lumi_calloc((size_t)bench->clusters.count, sizeof *bench->references);
+    bench->sources = lumi_calloc((size_t)bench->clusters.count, sizeof *bench->sources);
     bench->coded = lumi_calloc((size_t)bench->clusters.count, sizeof *bench->coded);
     bench->numbers = lumi_calloc((size_t)bench->clusters.count + 1, sizeof *bench->numbers);
     lumi_free(poses);
-    if (!bench->references || !bench->coded || !bench->numbers)
+    if (!bench->references || !bench->sources || !bench->coded || !bench->numbers)
         exit(1);
     for (int i = 0; i <= bench->clusters.count; i++)
         bench->numbers[i] = i;
+}
+
+struct options {
+    struct shape shape;
+    int quantizers[8], count, speed, neighbours;
+};
+
+static bool read_size(const char *text, int *width, int *height)
+{
+    return sscanf(text, "%dx%d", width, height) == 2 && *width > 0 && *height > 0;
+}
+
+/* Takes the options off the command line. */
+static bool read_options(int *argc, char ***argv, struct options *options)
+{
+    for (; *argc > 2 && strncmp((*argv)[1], "--", 2) == 0; *argc -= 2, *argv += 2) {
+        const char *name = (*argv)[1], *value = (*argv)[2];
+        if (strcmp(name, "--crop") == 0 && read_size(value, &options->shape.crop_width, &options->shape.crop_height))
+            continue;
+        if (strcmp(name, "--scale") == 0 && read_size(value, &options->shape.width, &options->shape.height))
+            continue;
+        if (strcmp(name, "--speed") == 0 && sscanf(value, "%d", &options->speed) == 1)
+            continue;
+        if (strcmp(name, "--neighbours") == 0 && sscanf(value, "%d", &options->neighbours) == 1 &&
+            options->neighbours >= 0 && options->neighbours <= LUMI_FILTER_OTHERS_MAX)
+            continue;
+        if (strcmp(name, "--quantizers") != 0)
+            return false;
+        options->count = 0;
+        for (const char *at = value; at && options->count < 8; at = strchr(at, ','), at = at ? at + 1 : NULL)
+            options->quantizers[options->count++] = atoi(at);
+    }
+    return *argc >= 4;
 }
 
 int main(int argc, char **argv)
 {
     static const float qualities[] = {30, 55, 75, 88, 94, 98};
     static const unsigned quantizers[] = {52, 40, 30, 20, 12, 5};
-    static const int ours[] = {32, 26, 21, 15, 8}; /* 38 to 45 dB and beyond on path-traced views */
     enum { POINTS = sizeof qualities / sizeof *qualities };
     struct point webps[POINTS], videos[POINTS];
+    struct options options = {.quantizers = {32, 26, 21, 15, 8}, .count = 5, .speed = 2, .neighbours = 12};
     struct bench bench = {0};
 
-    bool half = argc > 1 && strcmp(argv[1], "--half") == 0;
-    argc -= half;
-    argv += half;
-    if (argc < 4) {
-        fprintf(stderr, "usage: bench_codec [--half] COLUMNS RANGE FILE...\n");
+    if (!read_options(&argc, &argv, &options)) {
+        fputs("usage: bench_codec [--crop WxH] [--scale WxH] [--quantizers A,B,...] [--speed CPU-USED] "
+              "[--neighbours N] COLUMNS RANGE FILE...\n",
+              stderr);
         return 2;
     }
     bench.columns = atoi(argv[1]);
     bench.range = atoi(argv[2]);
     bench.count = argc - 3;
+    bench.speed = options.speed;
+    bench.neighbours = options.neighbours;
     if (bench.columns < 1)
         return 2;
-    load(&bench, argv + 3, half);
+    load(&bench, argv + 3, &options.shape);
     for (int i = 0; i < POINTS; i++) {
         webps[i] = webp(&bench, qualities[i]);
         videos[i] = video(&bench, quantizers[i]);
@@ -464,7 +569,7 @@ int main(int argc, char **argv)
     printf("%d images of %d x %d, %d reference images\n", bench.count, bench.images[0].width, bench.images[0].height,
            bench.clusters.count);
     puts("PSNR dB  B/image  WebP B/im  /ours  video B/im  ours/vid  side/tile  tiles/s  enc core-s/Mpx");
-    for (size_t i = 0; i < sizeof ours / sizeof *ours; i++)
-        measure(&bench, ours[i], webps, videos, POINTS);
+    for (int i = 0; i < options.count; i++)
+        measure(&bench, options.quantizers[i], webps, videos, POINTS);
     return 0;
 }
