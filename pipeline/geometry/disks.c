@@ -141,8 +141,12 @@ void lumi_surface_fit(int count, const struct lumi_pose *poses, enum lumi_surfac
     principal_axes(count, points, *centre, axes, spread);
     for (int i = 0; i < count; i++)
         across += fabs(lumi_dot(lumi_axis(&poses[i], 2), axes[2])) / count;
-    bool flat = spread[2] < 0.03 * spread[0];
-    if (flat && count > 2 && across < 0.5) { /* a ring: its circle's centre is the sphere's */
+    if (spread[0] <= 1e-9 * lumi_length(*centre)) /* one place, and rounding */
+        goto out;
+    /* Of a line the least axis is nothing but rounding: `across` says nothing there. */
+    bool line = spread[1] <= 0.03 * spread[0];
+    bool flat = line || spread[2] < 0.03 * spread[0];
+    if (flat && !line && across < 0.5) { /* a ring: its circle's centre is the sphere's */
         *surface = LUMI_SURFACE_SPHERE;
         for (int i = 0; i < count; i++)
             *radius += lumi_length(lumi_sub(points[i], *centre)) / count;
@@ -152,6 +156,7 @@ void lumi_surface_fit(int count, const struct lumi_pose *poses, enum lumi_surfac
         for (int i = 0; i < count; i++)
             *radius = fmax(*radius, lumi_length(lumi_sub(points[i], *centre)));
     }
+out:
     lumi_free(points);
 }
 

@@ -9,8 +9,8 @@
 #include "proto/lightfield/disk.h"
 #include "proto/lightfield/field.h"
 
-/* The surface the centres lie on: a plane if they are flat and the cameras look across it, else the sphere fitted to
- * them (least squares). `centre` and `radius` as in struct lumi_field_info. */
+/* The surface the centres lie on: a plane if they are on a line, or flat and the cameras look across it, else the
+ * sphere fitted to them (least squares). `centre` and `radius` as in struct lumi_field_info. */
 void lumi_surface_fit(int count, const struct lumi_pose *poses, enum lumi_surface *surface, struct lumi_vec3 *centre,
                       double *radius);
 

@@ -78,7 +78,7 @@ static int coarse_view(const struct source *source, int view)
     return -1;
 }
 
-/* One sample of a plane of a coarse view, decoded tile by tile into `cache`. */
+/* A coarse view and the tile of it that was decoded last. */
 struct coarse {
     struct lumi_tile_decoder *decoder;
     const struct lumi_grid *grid;

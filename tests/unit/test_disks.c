@@ -70,6 +70,32 @@ static void a_grid_is_a_plane_and_a_ring_is_a_sphere(void **state)
     assert_true(fabs(radius - 0.3) < 1e-9);
 }
 
+static void cameras_on_a_line_or_in_one_place_are_a_plane(void **state)
+{
+    struct lumi_pose poses[9];
+    struct lumi_disk disks[9];
+    enum lumi_surface surface;
+    struct lumi_vec3 centre;
+    double radius;
+
+    (void)state;
+    for (int slope = 0; slope < 3; slope++) { /* a slider that runs along an axis, or aslant, wherever it stands */
+        for (int i = 0; i < 9; i++)
+            lumi_pose_look(lumi_vec3(7 + 0.05 * i, 0.01 * slope * i, -0.02 * slope * i), lumi_vec3(0, 1, 0),
+                           lumi_vec3(0, 0, 1), &poses[i]);
+        lumi_surface_fit(9, poses, &surface, &centre, &radius);
+        assert_int_equal(surface, LUMI_SURFACE_PLANE);
+        assert_int_equal(lumi_disks_make(9, poses, surface, centre, radius, 1, disks, NULL), LUMI_OK);
+        for (int i = 0; i < 9; i++)
+            assert_true(fabsf(disks[i].u_pos - 0.05f) < 1e-6f && fabsf(disks[i].u_neg - 0.05f) < 1e-6f);
+    }
+    for (int i = 0; i < 9; i++)
+        poses[i] = poses[1];
+    lumi_surface_fit(9, poses, &surface, &centre, &radius);
+    assert_int_equal(surface, LUMI_SURFACE_PLANE);
+    assert_true(radius == 0);
+}
+
 static void the_camera_mesh_of_a_grid_covers_it_once(void **state)
 {
     struct lumi_pose poses[20];
@@ -165,6 +191,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_is_fitted_to_its_centre_and_radius),
         cmocka_unit_test(a_grid_is_a_plane_and_a_ring_is_a_sphere),
+        cmocka_unit_test(cameras_on_a_line_or_in_one_place_are_a_plane),
         cmocka_unit_test(the_camera_mesh_of_a_grid_covers_it_once),
         cmocka_unit_test(the_camera_mesh_of_a_sphere_is_closed),
         cmocka_unit_test(disks_of_a_grid_reach_the_neighbours_and_borders_mirror),
