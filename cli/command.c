@@ -38,8 +38,9 @@ int cli_parse_doubles(const char *option, const char *text, char separator, int 
         char *end;
         values[i] = g_ascii_strtod(at, &end);
         if (end == at || *end != (i + 1 < count ? separator : '\0') || !(values[i] - values[i] == 0))
-            return lumi_fail(error, LUMI_ERR_ARG, "%s %s: %d number%s separated by '%c' wanted", option, text, count,
-                             count == 1 ? "" : "s", separator);
+            return count == 1 ? lumi_fail(error, LUMI_ERR_ARG, "%s %s: a number wanted", option, text)
+                              : lumi_fail(error, LUMI_ERR_ARG, "%s %s: %d numbers separated by '%c' wanted", option,
+                                          text, count, separator);
         at = end + 1;
     }
     return LUMI_OK;

@@ -2,6 +2,7 @@
 #include "pipeline/evaluate/evaluate.h"
 
 #include "pipeline/evaluate/sheet.h"
+#include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
 
@@ -208,6 +209,8 @@ int lumi_evaluate(const char *field, const struct lumi_truth_set *truth, const s
 
     memset(evaluation, 0, sizeof *evaluation);
     render.disks.sample = LUMI_U8;
+    if (options->sheet)
+        LUMI_TRY(lumi_file_check_place(options->sheet, error));
     if (options->difference && g_mkdir_with_parents(options->difference, 0777))
         return lumi_fail_errno(error, options->difference, "making the folder");
     evaluation->views = lumi_calloc((size_t)truth->count, sizeof *evaluation->views);

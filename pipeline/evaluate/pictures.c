@@ -2,6 +2,7 @@
 #include "pipeline/evaluate/pictures.h"
 
 #include "pipeline/exchange/video.h"
+#include "proto/base/file.h"
 #include "proto/image/image.h"
 
 #include <glib.h>
@@ -129,16 +130,19 @@ static int begin(struct job *job, const struct lumi_shot *shots, int count, stru
     job->several = count > 1;
     if (o->depth && !job->several && lumi_image_format_of_name(o->depth) != LUMI_IMAGE_EXR)
         return lumi_fail(error, LUMI_ERR_ARG, "%s: depth is written as .exr", o->depth);
+    if (o->depth && !job->several)
+        LUMI_TRY(lumi_file_check_place(o->depth, error));
     if (o->depth && !strcmp(o->depth, job->output))
         return lumi_fail(error, LUMI_ERR_ARG, "%s: pictures and depth need two places", o->depth);
     if (o->depth && job->several)
         LUMI_TRY(make_folder(o->depth, error));
+    bool picture = lumi_image_format_of_name(job->output) != LUMI_IMAGE_AUTO;
     if (!film && job->several)
-        return make_folder(job->output, error);
+        return picture ? lumi_fail(error, LUMI_ERR_ARG, "%s: %d pictures want a folder, or a film", job->output, count)
+                       : make_folder(job->output, error);
     if (!film)
-        return lumi_image_format_of_name(job->output) != LUMI_IMAGE_AUTO
-                   ? LUMI_OK
-                   : lumi_fail(error, LUMI_ERR_ARG, "%s: .png, .jpg, .tif, .exr or .webm wanted", job->output);
+        return picture ? lumi_file_check_place(job->output, error)
+                       : lumi_fail(error, LUMI_ERR_ARG, "%s: .png, .jpg, .tif, .exr or .webm wanted", job->output);
     for (int i = 1; i < count; i++)
         if (shots[i].lens.width != shots[0].lens.width || shots[i].lens.height != shots[0].lens.height)
             return lumi_fail(error, LUMI_ERR_ARG, "%s: pictures of different sizes do not make a film", job->output);

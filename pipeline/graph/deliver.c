@@ -6,7 +6,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <glib.h>
 #include <unistd.h>
 
 enum { BLOCK = 1 << 20 };
@@ -49,17 +48,4 @@ int lumi_deliver(const char *from, const char *to, struct lumi_error *error)
     }
     close(in);
     return code;
-}
-
-int lumi_deliver_check(const char *to, struct lumi_error *error)
-{
-    g_autofree char *folder = g_path_get_dirname(to);
-
-    if (g_file_test(to, G_FILE_TEST_IS_DIR))
-        return lumi_fail(error, LUMI_ERR_ARG, "%s: is a folder; the name of a file is wanted", to);
-    if (!g_file_test(folder, G_FILE_TEST_IS_DIR))
-        return lumi_fail(error, LUMI_ERR_ARG, "%s: there is no folder '%s'", to, folder);
-    if (access(folder, W_OK))
-        return lumi_fail_errno(error, to, "create");
-    return LUMI_OK;
 }

@@ -7,7 +7,4 @@
 /* Copies `from` to `to` under a temporary name in `to`'s folder, synced and renamed; on failure nothing is left. */
 int lumi_deliver(const char *from, const char *to, struct lumi_error *error);
 
-/* Whether lumi_deliver could write there, asked before hours of work. */
-int lumi_deliver_check(const char *to, struct lumi_error *error);
-
 #endif

@@ -56,7 +56,7 @@ int lumi_graph_process(struct lumi_run *run, const char *output, lumi_graph_repo
     const struct lumi_stage *last = NULL;
 
     LUMI_TRY(lumi_file_check_output(output, run->capture, error));
-    LUMI_TRY(lumi_deliver_check(output, error));
+    LUMI_TRY(lumi_file_check_place(output, error));
     for (int i = 0; lumi_stages[i]; i++) {
         int skipped = 0;
         last = lumi_stages[i];

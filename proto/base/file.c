@@ -210,6 +210,24 @@ int lumi_file_write(const char *path, const void *data, size_t size, bool sync, 
     return lumi_new_file_close(&file, code, sync, error);
 }
 
+int lumi_file_check_place(const char *path, struct lumi_error *error)
+{
+    struct stat status;
+    char *folder = folder_of(path);
+    int code = LUMI_OK;
+
+    if (!folder)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory", path);
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode))
+        code = lumi_fail(error, LUMI_ERR_ARG, "%s: is a folder; the name of a file is wanted", path);
+    else if (stat(folder, &status) || !S_ISDIR(status.st_mode))
+        code = fail_folder(path, error);
+    else if (access(folder, W_OK))
+        code = lumi_fail_errno(error, path, "create");
+    free(folder);
+    return code;
+}
+
 static bool same_file(const struct stat *a, const struct stat *b)
 {
     return a->st_dev == b->st_dev && a->st_ino == b->st_ino;

@@ -36,6 +36,10 @@ int lumi_new_file_close(struct lumi_new_file *file, int code, bool sync, struct 
  */
 int lumi_file_write(const char *path, const void *data, size_t size, bool sync, struct lumi_error *error);
 
+/* Whether a file could be made or replaced at `path`, asked before hours of work: LUMI_ERR_ARG where that is a folder
+ * or in a folder that is not there, LUMI_ERR_IO where nothing can be written. */
+int lumi_file_check_place(const char *path, struct lumi_error *error);
+
 /* LUMI_ERR_ARG where a file at `path` (there already or not) would take the place of `input`, or of a part of it: it is
  * that file, or lies in that folder. */
 int lumi_file_check_output(const char *path, const char *input, struct lumi_error *error);

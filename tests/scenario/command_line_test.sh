@@ -69,6 +69,13 @@ done
 expect_line 2 "depth is written as .exr" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 32x32 -o y.png --depth copy.lumi
 expect_line 2 "need two places" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 32x32 -o y.exr --depth y.exr
 expect_line 2 "2 to 16384 pixels a side" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 1x1 -o y.webm
+expect_line 2 "2 pictures want a folder" "$lumi" render copy.lumi -p 0,0,0,90,0 -p 0,0,0,80,0 -s 32x32 -o y.png
+expect_line 2 "there is no folder 'nowhere'" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 32x32 -o nowhere/y.png
+expect_line 2 "--stretch x: a number wanted" "$lumi" render copy.lumi -p 0,0,0,90,0 --stretch x -o y.png
+"$lumi" export "a ü.capture" --transforms truth.json || fail "no transforms"
+expect_line 2 "there is no folder 'nowhere'" "$lumi" eval copy.lumi --truth truth.json --difference late \
+    --sheet nowhere/y.png
+[ ! -e late ] || fail "compared views for a sheet that cannot be made"
 expect_line 2 "--size 1e30x1" "$lumi" render copy.lumi -p 0,0,0,90,0 -s 1e30x1 -o y.png
 cmp copy.lumi "b é.lumi" || fail "an export replaced what it read"
 [ "$(wc -c <m.ply)" -eq "$(wc -c <n.ply)" ] || fail "the field's mesh has another size than the work directory's"
