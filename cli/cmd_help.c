@@ -44,7 +44,7 @@ static int run_help(int argc, char **argv, struct lumi_error *error)
         if (!strcmp(cli_commands[i]->name, name))
             command = cli_commands[i];
     if (argc > 0 && !command)
-        return lumi_fail(error, LUMI_ERR_ARG, "no command '%s'", name);
+        return cli_no_command(name, error);
     if (completion) {
         if (strcmp(completion, "bash"))
             return lumi_fail(error, LUMI_ERR_ARG, "--completion %s: only bash is known", completion);

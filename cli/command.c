@@ -8,6 +8,18 @@
 #include <string.h>
 #include <unistd.h>
 
+int cli_no_command(const char *word, struct lumi_error *error)
+{
+    g_autoptr(GString) longer = g_string_new(NULL);
+    g_autofree char *start = g_strconcat(word, " ", NULL);
+
+    for (int i = 0; cli_commands[i]; i++)
+        if (g_str_has_prefix(cli_commands[i]->name, start))
+            g_string_append_printf(longer, "%s '%s'", longer->len ? "," : "", cli_commands[i]->name);
+    return longer->len ? lumi_fail(error, LUMI_ERR_ARG, "'%s' what? There are%s", word, longer->str)
+                       : lumi_fail(error, LUMI_ERR_ARG, "no command '%s' (see 'lumi help')", word);
+}
+
 static bool shown;
 
 void cli_progress(const char *what, long done, long total)

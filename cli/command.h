@@ -23,6 +23,9 @@ struct cli_command {
 
 extern const struct cli_command *const cli_commands[]; /* NULL-terminated, by name; made by the build */
 
+/* LUMI_ERR_ARG: there is no such command. "sim" alone is none, but the beginning of some: those are named. */
+int cli_no_command(const char *word, struct lumi_error *error);
+
 /* Progress on a terminal, silent in a pipe: redraws one line on standard error. total ≤ 0: no percentage.
  * cli_progress_end clears the line. */
 void cli_progress(const char *what, long done, long total);

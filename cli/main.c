@@ -35,19 +35,12 @@ static const struct cli_command *find(int argc, char **argv, int *words)
     return best;
 }
 
-/* "sim" alone is no command, but the beginning of some: those are named. */
 static int usage_error(const char *word)
 {
-    g_autoptr(GString) longer = g_string_new(NULL);
-    g_autofree char *start = g_strconcat(word, " ", NULL);
+    struct lumi_error error;
 
-    for (int i = 0; cli_commands[i]; i++)
-        if (g_str_has_prefix(cli_commands[i]->name, start))
-            g_string_append_printf(longer, "%s '%s'", longer->len ? "," : "", cli_commands[i]->name);
-    if (longer->len)
-        fprintf(stderr, "lumi: '%s' what? There are%s\n", word, longer->str);
-    else
-        fprintf(stderr, "lumi: no command '%s' (see 'lumi help')\n", word);
+    cli_no_command(word, &error);
+    fprintf(stderr, "lumi: %s\n", error.text);
     return 2;
 }
 

@@ -8,6 +8,7 @@ cd "$scratch" || exit 1
 
 expect_line 2 "no command 'nosuch'" "$lumi" nosuch
 expect_line 2 "'sim shoot', 'sim truth'" "$lumi" sim
+expect_line 2 "'sim shoot', 'sim truth'" "$lumi" help sim
 for command in import export process render eval info verify "sim shoot" "sim truth"; do
     # shellcheck disable=SC2086
     expect_line 2 "usage: lumi $command" "$lumi" $command
