@@ -26,19 +26,6 @@ static int number_of(const char *view, int count)
 
 /* From a field */
 
-static void place_tile(const struct lumi_tile_pixels *tile, int column, int row, const struct lumi_yuv *image)
-{
-    for (int plane = 0; plane < 3; plane++) {
-        const uint8_t *from = plane == 0 ? tile->y : plane == 1 ? tile->u : tile->v;
-        int side = plane ? LUMI_TILE / 2 : LUMI_TILE;
-        int width = lumi_yuv_width(image, plane), height = lumi_yuv_height(image, plane);
-        int w = MIN(side, width - column * side), h = MIN(side, height - row * side);
-        for (int y = 0; y < h; y++)
-            memcpy(image->plane[plane] + (size_t)(row * side + y) * (size_t)width + column * side, from + y * side,
-                   (size_t)w);
-    }
-}
-
 static int decode_tiles(struct lumi_tile_decoder *decoder, const struct lumi_grid *grid, int view,
                         const struct lumi_yuv *image, struct lumi_error *error)
 {
@@ -46,7 +33,7 @@ static int decode_tiles(struct lumi_tile_decoder *decoder, const struct lumi_gri
         for (int column = 0; column < grid->cols; column++) {
             struct lumi_tile_pixels tile;
             LUMI_TRY(lumi_field_decode_tile(decoder, LUMI_LEVEL_FINE, view, column, row, &tile, error));
-            place_tile(&tile, column, row, image);
+            lumi_tile_place(&tile, column, row, image);
         }
     return LUMI_OK;
 }

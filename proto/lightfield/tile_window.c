@@ -32,6 +32,19 @@ void lumi_window_copy(const struct lumi_yuv *image, int x, int y, struct lumi_ti
     }
 }
 
+void lumi_tile_place(const struct lumi_tile_pixels *tile, int column, int row, const struct lumi_yuv *image)
+{
+    const uint8_t *planes[3] = {tile->y, tile->u, tile->v};
+
+    for (int p = 0; p < 3; p++) {
+        int size = p ? LUMI_TILE / 2 : LUMI_TILE, width = lumi_yuv_width(image, p), height = lumi_yuv_height(image, p);
+        int across = width - column * size < size ? width - column * size : size;
+        for (int y = 0; y < size && row * size + y < height; y++)
+            memcpy(image->plane[p] + (size_t)(row * size + y) * (size_t)width + (size_t)(column * size),
+                   planes[p] + (size_t)y * (size_t)size, (size_t)across);
+    }
+}
+
 uint64_t lumi_tile_hash(const struct lumi_tile_pixels *pixels)
 {
     const uint64_t prime = UINT64_C(0x9e3779b97f4a7c15);

@@ -1,4 +1,4 @@
-/* What tile encoder and decoder share: windows of reference images, and the hash that tells decoded tiles apart. */
+/* Tiles and images: windows of reference images, decoded tiles put in their place, the hash that tells tiles apart. */
 #ifndef LUMI_PROTO_LIGHTFIELD_TILE_WINDOW_H
 #define LUMI_PROTO_LIGHTFIELD_TILE_WINDOW_H
 
@@ -27,6 +27,9 @@ struct lumi_shift {
 /* Copies the 64×64 luma pixels (and their chroma) whose top left is (x, y), both even, from an image; beyond its edge
  * the nearest pixels are repeated. */
 void lumi_window_copy(const struct lumi_yuv *image, int x, int y, struct lumi_tile_pixels *window);
+
+/* Puts a decoded tile where it belongs in its image; what lies beyond the image's edge is dropped. */
+void lumi_tile_place(const struct lumi_tile_pixels *tile, int column, int row, const struct lumi_yuv *image);
 
 /* A 64-bit hash of a tile's pixels (docs/lumi-format.md, "Tile checksum"). */
 uint64_t lumi_tile_hash(const struct lumi_tile_pixels *pixels);

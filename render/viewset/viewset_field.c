@@ -48,23 +48,6 @@ static void return_decoder(struct source *source, struct lumi_tile_decoder *deco
     pthread_mutex_unlock(&source->lock);
 }
 
-static void put_plane(const struct lumi_yuv *image, int plane, const uint8_t *tile, int size, int column, int row)
-{
-    int width = lumi_yuv_width(image, plane), height = lumi_yuv_height(image, plane);
-    int across = width - column * size < size ? width - column * size : size;
-
-    for (int y = 0; y < size && row * size + y < height; y++)
-        memcpy(image->plane[plane] + (size_t)(row * size + y) * (size_t)width + (size_t)(column * size),
-               tile + (size_t)y * (size_t)size, (size_t)across);
-}
-
-static void put_tile(const struct lumi_yuv *image, const struct lumi_tile_pixels *pixels, int column, int row)
-{
-    put_plane(image, 0, pixels->y, LUMI_TILE, column, row);
-    put_plane(image, 1, pixels->u, LUMI_TILE / 2, column, row);
-    put_plane(image, 2, pixels->v, LUMI_TILE / 2, column, row);
-}
-
 /* The same view at the coarse level, or −1. */
 static int coarse_view(const struct source *source, int view)
 {
@@ -132,12 +115,12 @@ static int damaged_tile(const struct source *source, struct lumi_tile_decoder *d
         coarse.grid =
             lumi_field_grid(source->field, lumi_field_view(source->field, LUMI_LEVEL_COARSE, coarse.view)->grid);
         if (patch_tile(&coarse, grid, column, row, pixels) == LUMI_OK) {
-            put_tile(image, pixels, column, row);
+            lumi_tile_place(pixels, column, row, image);
             return LUMI_OK;
         }
     }
     memset(pixels, 128, sizeof *pixels);
-    put_tile(image, pixels, column, row);
+    lumi_tile_place(pixels, column, row, image);
     if (!slot->missing)
         slot->missing = lumi_calloc((size_t)grid->cols * (size_t)grid->rows, 1);
     if (!slot->missing)
@@ -159,7 +142,7 @@ static int decode_tiles(const struct source *source, struct lumi_tile_decoder *d
             if (code == LUMI_ERR_NOMEM)
                 return code;
             if (code == LUMI_OK)
-                put_tile(image, &pixels, column, row);
+                lumi_tile_place(&pixels, column, row, image);
             else if (damaged_tile(source, decoder, view, column, row, image, slot, &pixels) != LUMI_OK)
                 return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to decode a view");
         }

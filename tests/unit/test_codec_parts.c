@@ -252,6 +252,30 @@ static void windows_repeat_the_edge(void **state)
     lumi_yuv_finish(&image);
 }
 
+/* The last column and row overhang the image, whose sides are odd. */
+static void tiles_cut_out_and_put_back_are_the_image(void **state)
+{
+    struct lumi_yuv image, copy;
+    struct lumi_tile_pixels tile;
+    unsigned seed = 5;
+
+    (void)state;
+    assert_int_equal(lumi_yuv_create(&image, 131, 65), LUMI_OK);
+    assert_int_equal(lumi_yuv_create(&copy, 131, 65), LUMI_OK);
+    for (int p = 0; p < 3; p++)
+        for (int i = 0; i < lumi_yuv_width(&image, p) * lumi_yuv_height(&image, p); i++)
+            image.plane[p][i] = (uint8_t)draw(&seed);
+    for (int i = 0; i < 6; i++) {
+        lumi_window_copy(&image, i % 3 * LUMI_TILE, i / 3 * LUMI_TILE, &tile);
+        lumi_tile_place(&tile, i % 3, i / 3, &copy);
+    }
+    for (int p = 0; p < 3; p++)
+        assert_memory_equal(copy.plane[p], image.plane[p],
+                            (size_t)(lumi_yuv_width(&image, p) * lumi_yuv_height(&image, p)));
+    lumi_yuv_finish(&image);
+    lumi_yuv_finish(&copy);
+}
+
 static void built_headers_are_parsed_back(void **state)
 {
     unsigned seed = 11;
@@ -315,6 +339,7 @@ int main(void)
         cmocka_unit_test(smooth_colour_survives_yuv),
         cmocka_unit_test(primaries_have_their_bt709_values),
         cmocka_unit_test(windows_repeat_the_edge),
+        cmocka_unit_test(tiles_cut_out_and_put_back_are_the_image),
         cmocka_unit_test(built_headers_are_parsed_back),
         cmocka_unit_test(a_shifted_tile_is_found),
     };
