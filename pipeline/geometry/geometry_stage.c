@@ -163,7 +163,7 @@ static int coarse_make(struct lumi_run *run, void *state, int index, int thread,
 const struct lumi_stage lumi_stage_geometry = {
     .name = "geometry",
     .title = "geometry",
-    .version = 1,
+    .version = 2,
     .extension = ".mesh",
     .key = key,
     .make = make,
@@ -172,7 +172,7 @@ const struct lumi_stage lumi_stage_geometry = {
 const struct lumi_stage lumi_stage_geometry_coarse = {
     .name = "geometry-coarse",
     .title = "coarse geometry",
-    .version = 1,
+    .version = 2,
     .extension = ".mesh",
     .key = key,
     .begin = coarse_begin,

@@ -414,25 +414,47 @@ static void start_heights(struct surface *s)
     }
 }
 
-/* How much a pixel's depth matters: little where nothing in the picture changes around it. */
-static void weigh(const struct lumi_raster *colour, int width, int height, float *weight)
+/* A row of the picture in square-root light. */
+static void square_root_row(const struct lumi_raster *colour, int y, float *result)
 {
-    const float floor_weight = 0.15f, full = 0.08f; /* a difference of 0.08 in square-root light counts in full */
+    const float *row = lumi_row_f32(colour, y);
 
-    for (int y = 0; y < height; y++)
+    for (int i = 0; i < 3 * colour->width; i++)
+        result[i] = sqrtf(row[i] > 0 ? row[i] : 0);
+}
+
+/* How much a pixel's depth matters. Where it is wrong by a little, the picture is wrong by as much as it changes there,
+ * and that counts in square: little where nothing changes, most at the rim of something dark before something bright.
+ */
+static int weigh(const struct lumi_raster *colour, int width, int height, float *weight)
+{
+    const float floor_weight = 0.05f, full = 0.2f; /* a difference of 0.2 in square-root light counts in full */
+    const size_t line = 3 * (size_t)width;
+    float *roots = lumi_alloc(3 * line, sizeof(float)); /* row y at y % 3 */
+
+    if (!roots)
+        return LUMI_ERR_NOMEM;
+    square_root_row(colour, 0, roots);
+    for (int y = 0; y < height; y++) {
+        const float *own = roots + (size_t)(y % 3) * line;
+        if (y + 1 < height)
+            square_root_row(colour, y + 1, roots + (size_t)((y + 1) % 3) * line);
         for (int x = 0; x < width; x++) {
+            const float *a = own + 3 * x;
             float most = 0;
             for (int j = y > 0 ? y - 1 : 0; j <= y + 1 && j < height; j++)
                 for (int i = x > 0 ? x - 1 : 0; i <= x + 1 && i < width; i++) {
-                    const float *a = lumi_row_f32(colour, y) + colour->channels * x;
-                    const float *b = lumi_row_f32(colour, j) + colour->channels * i;
-                    float difference = 0;
-                    for (int c = 0; c < 3; c++)
-                        difference += fabsf(sqrtf(fmaxf(a[c], 0)) - sqrtf(fmaxf(b[c], 0)));
-                    most = fmaxf(most, difference / 3);
+                    const float *b = roots + (size_t)(j % 3) * line + 3 * i;
+                    float difference = fabsf(a[0] - b[0]) + fabsf(a[1] - b[1]) + fabsf(a[2] - b[2]);
+                    most = difference > most ? difference : most;
                 }
-            weight[(size_t)y * (size_t)width + (size_t)x] = fminf(1, floor_weight + most * (1 - floor_weight) / full);
+            most /= 3 * full;
+            const float value = floor_weight + most * most * (1 - floor_weight);
+            weight[(size_t)y * (size_t)width + (size_t)x] = value < 1 ? value : 1;
         }
+    }
+    lumi_free(roots);
+    return LUMI_OK;
 }
 
 void lumi_simplify_defaults(struct lumi_simplify_options *options)
@@ -469,8 +491,8 @@ int lumi_simplify(const struct lumi_raster *inverse_depth, const struct lumi_ras
             target[(size_t)y * width + (size_t)x] = h > 0 && h < 1e6 ? (float)h : 0;
             weight[(size_t)y * width + (size_t)x] = 1;
         }
-    if (colour)
-        weigh(colour, grid->width, grid->height, weight);
+    if (colour && weigh(colour, grid->width, grid->height, weight) != LUMI_OK)
+        goto done;
     s.target = target;
     s.weight = weight;
     start_heights(&s);
