@@ -371,7 +371,6 @@ static int run(struct filter *filter, const struct lumi_filter_view *others, int
     filter->noise = lumi_alloc((size_t)filter->cols * (size_t)filter->rows, sizeof *filter->noise);
     if (stack && filter->noise)
         code = pad_plane(filter->reference, 0, &filter->luma);
-
     if (code == LUMI_OK)
         code = lumi_yuv_create(filtered, filter->reference->width, filter->reference->height);
     if (code != LUMI_OK)

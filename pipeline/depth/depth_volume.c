@@ -123,7 +123,6 @@ static void sweep_block(const struct volume_job *job, int row, int column, struc
 static int volume_row(void *context, int row, int thread)
 {
     const struct volume_job *job = context;
-
     struct block_row costs;
 
     (void)thread;

@@ -4,24 +4,9 @@
 #include "pipeline/exchange/ply.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
+#include "proto/lightfield/mesh_raster.h"
 
 #include <string.h>
-
-/* Place of a vertex in the image, and its inverse depth. */
-struct corner {
-    double x, y, w;
-};
-
-static struct corner corner_of(const struct lumi_view_mesh *mesh, int tile, const struct lumi_mesh_vertex *vertex)
-{
-    struct corner c = {
-        (tile % mesh->cols) * LUMI_TILE + vertex->s * (LUMI_TILE / 255.0),
-        (tile / mesh->cols) * LUMI_TILE + vertex->t * (LUMI_TILE / 255.0),
-        lumi_mesh_inverse_depth(mesh, &mesh->tiles[tile], vertex->d),
-    };
-
-    return c;
-}
 
 int lumi_export_depth(const char *path, const struct lumi_raster *inverse_depth, struct lumi_error *error)
 {
@@ -54,7 +39,7 @@ struct arrays {
 };
 
 static void place_vertex(const struct lumi_grid *grid, const struct lumi_pose *pose, const struct lumi_raster *image,
-                         struct corner c, double far_m, const struct arrays *arrays, size_t at)
+                         struct lumi_mesh_point c, double far_m, const struct arrays *arrays, size_t at)
 {
     double tan_x, tan_y;
 
@@ -83,7 +68,7 @@ static void gather(const struct lumi_grid *grid, const struct lumi_pose *pose, c
         for (int t = 0; t < 3 * tile->triangle_count; t++)
             arrays->indices[index++] = (uint32_t)(vertex + tile->indices[t]);
         for (int v = 0; v < tile->vertex_count; v++)
-            place_vertex(grid, pose, image, corner_of(mesh, i, &tile->vertices[v]), far_m, arrays, vertex++);
+            place_vertex(grid, pose, image, lumi_mesh_point(mesh, i, &tile->vertices[v]), far_m, arrays, vertex++);
     }
 }
 

@@ -5,25 +5,21 @@
 
 #include <math.h>
 
-/* Place of a vertex in the image, and its inverse depth. */
-struct corner {
-    double x, y, w;
-};
-
-static struct corner corner_of(const struct lumi_view_mesh *mesh, int tile, const struct lumi_mesh_vertex *vertex)
+struct lumi_mesh_point lumi_mesh_point(const struct lumi_view_mesh *mesh, int tile,
+                                       const struct lumi_mesh_vertex *vertex)
 {
-    struct corner c = {
+    struct lumi_mesh_point p = {
         (tile % mesh->cols) * LUMI_TILE + vertex->s * (LUMI_TILE / 255.0),
         (tile / mesh->cols) * LUMI_TILE + vertex->t * (LUMI_TILE / 255.0),
         lumi_mesh_inverse_depth(mesh, &mesh->tiles[tile], vertex->d),
     };
 
-    return c;
+    return p;
 }
 
 /* Within a tile the lens is rectilinear, so inverse depth is linear in the image. Edges count as inside on both sides:
  * the two triangles agree there. */
-static void fill_triangle(const struct corner c[3], const struct lumi_raster *out)
+static void fill_triangle(const struct lumi_mesh_point c[3], const struct lumi_raster *out)
 {
     double area = (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x);
 
@@ -56,9 +52,9 @@ int lumi_mesh_rasterize(const struct lumi_view_mesh *mesh, int width, int height
     for (int i = 0; i < mesh->cols * mesh->rows; i++) {
         const struct lumi_tile_mesh *tile = &mesh->tiles[i];
         for (int t = 0; t < tile->triangle_count; t++) {
-            struct corner c[3];
+            struct lumi_mesh_point c[3];
             for (int k = 0; k < 3; k++)
-                c[k] = corner_of(mesh, i, &tile->vertices[tile->indices[3 * t + k]]);
+                c[k] = lumi_mesh_point(mesh, i, &tile->vertices[tile->indices[3 * t + k]]);
             fill_triangle(c, inverse_depth);
         }
     }

@@ -144,6 +144,74 @@ static void thin_bars_are_antialiased(void **state)
     sim_scene_destroy(scene);
 }
 
+/* What a pixel shows of a bright half-plane whose edge lies `t` pixels beyond the pixel's centre: the integral of a
+ * tent a pixel wide to either side. */
+static float tent_covered(float t)
+{
+    if (t <= -1 || t >= 1)
+        return t < 0 ? 0 : 1;
+    return t < 0 ? (1 + t) * (1 + t) / 2 : 1 - (1 - t) * (1 - t) / 2;
+}
+
+/* Wherever the edge lies within a pixel, also where no ray of the pixel itself sees both of its sides. */
+static void edges_are_as_soft_as_a_pixel(void **state)
+{
+    struct lumi_lens lens;
+    struct lumi_pose pose;
+
+    (void)state;
+    lumi_lens_init_pinhole(&lens, 16, 8, 0.2);
+    lumi_pose_look(lumi_vec3(0, 0, 0), lumi_vec3(0, 1, 0), lumi_vec3(0, 0, 1), &pose);
+    for (int i = 0; i < 10; i++) {
+        struct sim_scene *scene;
+        struct sim_material m;
+        struct lumi_raster color;
+        float edge = 0.1f * (float)i; /* pixels right of the image's middle */
+        assert_int_equal(sim_scene_create(&scene, NULL), LUMI_OK);
+        sim_material_init(&m);
+        m.color = v3_grey(0);
+        m.emission = v3_grey(1);
+        sim_quad(scene, v3(-5, 2, -5), v3(5 + (float)(2 * edge / lens.fx), 0, 0), v3(0, 0, 10), 20,
+                 sim_scene_material(scene, &m));
+        assert_int_equal(sim_scene_commit(scene, NULL), LUMI_OK);
+        assert_int_equal(sim_camera_render(scene, &lens, &pose, 1, &color, NULL, NULL), LUMI_OK);
+        for (int y = 0; y < 8; y++)
+            for (int x = 0; x < 16; x++) {
+                float shown = lumi_row_f32(&color, y)[3 * x], wanted = tent_covered(8 + edge - ((float)x + 0.5f));
+                assert_true(fabsf(shown - wanted) < 0.05f);
+            }
+        lumi_raster_finish(&color);
+        sim_scene_destroy(scene);
+    }
+}
+
+/* Light on the floor under a shining panel. */
+static float light_under_panel(float gain)
+{
+    struct sim_scene *scene;
+    struct sim_material m;
+
+    assert_int_equal(sim_scene_create(&scene, NULL), LUMI_OK);
+    sim_material_init(&m);
+    sim_quad(scene, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0), 20, sim_scene_material(scene, &m));
+    m.emission = v3_grey(0.9f);
+    sim_quad(scene, v3(-1, 1, 2), v3(2, 0, 0), v3(0, -2, 0), 20, sim_scene_material(scene, &m));
+    sim_scene_light(scene, v3(-1, 1, 2), v3(2, 0, 0), v3(0, -2, 0), gain);
+    assert_int_equal(sim_scene_commit(scene, NULL), LUMI_OK);
+    float light = sim_vertex_light(scene, 0).x;
+    sim_scene_destroy(scene);
+    return light;
+}
+
+static void lights_give_as_much_more_as_their_gain_says(void **state)
+{
+    float once = light_under_panel(1);
+
+    (void)state;
+    assert_true(once > 0.05f);
+    assert_true(fabsf(light_under_panel(3) - 3 * once) < 1e-4f);
+}
+
 static void pictures_do_not_depend_on_the_number_of_threads(void **state)
 {
     struct lumi_lens lens;
@@ -216,6 +284,8 @@ int main(void)
         cmocka_unit_test(depth_of_a_wall_is_its_distance_along_the_axis),
         cmocka_unit_test(points_appear_where_the_lens_projects_them),
         cmocka_unit_test(thin_bars_are_antialiased),
+        cmocka_unit_test(edges_are_as_soft_as_a_pixel),
+        cmocka_unit_test(lights_give_as_much_more_as_their_gain_says),
         cmocka_unit_test(pictures_do_not_depend_on_the_number_of_threads),
         cmocka_unit_test(room_and_court_leave_the_rig_its_space_and_come_close),
         cmocka_unit_test(a_place_that_is_not_there_is_an_error),
