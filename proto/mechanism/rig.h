@@ -12,6 +12,7 @@
 
 #include "proto/base/lens.h"
 #include "proto/base/result.h"
+#include "proto/mechanism/control.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -83,6 +84,7 @@ struct lumi_rig {
     int turns;
     struct lumi_rig_string string;
     struct lumi_rig_uncertainty uncertainty;
+    struct lumi_rig_control control; /* limits, wiring, reactions: for the board */
 };
 
 /* 16 cameras × 72 positions on a sphere of 70 cm, 110° × 88°, one turn with the arm held ("arc16"); the same with the

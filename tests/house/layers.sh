@@ -65,6 +65,9 @@ FILENAME == table {
     short = folder
     sub(/.*\//, "", short)
     long_name[short] = folder
+    joined = folder
+    gsub(/\//, "_", joined) # firmware/core is also firmware_core
+    long_name[joined] = folder
     for (i = 3; i <= NF; i++)
         if ($1 == "may")
             may[folder, $i] = 1
