@@ -2,10 +2,7 @@
 # What the pipeline costs: core-seconds a megapixel of every stage and the most memory held, by `lumi process --json`, on
 # captures of several kinds; and how that memory grows with the number of images.
 #
-# The issue's bound, 3 GiB for 1,300 images of 1280 x 1024, is hours to run; it is checked in two parts: what nine large
-# images take, and what each further one adds, by captures of 9, 40, 80 and 160 images of 128 x 128 (up to 40 views stay in
-# memory for their neighbours' depth, so the growth to 40 is counted by itself). The last line puts these together, in
-# proportion to pixels, and says that it is an extrapolation.
+# Nine large images, and 9, 40, 80 and 160 of 128 x 128. What 1,300 large images take is `script/bench memory`'s matter.
 # usage: stages.sh BUILD [DIR] [CAPTURE...]   (DIR: kept, its photographs used again; CAPTURE: also of these)
 set -eu
 . "$(dirname "$0")/functions"
@@ -45,7 +42,6 @@ measure() { # NAME CAPTURE
 [ -d "$dir/large.capture" ] ||
     "$lumi" sim shoot room --rig planar:3x3:0.05 --fov 90 --size 1280x1024 -o "$dir/large.capture"
 measure large "$dir/large.capture"
-large=$peak
 
 [ -d "$dir/many" ] || "$lumi" sim truth room --rig sphere:8x20:0.35 --fov 90 --size 128x128 --no-depth -o "$dir/many"
 points=
@@ -60,11 +56,3 @@ for capture in "$@"; do
 done
 
 echo "memory at most, by the number of images:$points (images:bytes)"
-echo "$points" | awk -v large="$large" '{
-    for (i = 1; i <= 4; i++) { split($i, p, ":"); n[i] = p[1]; at[i] = p[2] }
-    ratio = 1280 * 1024 / (128 * 128)
-    each = (at[4] - at[3]) / (n[4] - n[3])
-    if (each < 0) each = 0
-    printf "from %d to %d images: %.1f kB each, %.2f bytes a pixel\n", n[3], n[4], each / 1e3, each / 128 / 128
-    all = large + (at[3] > at[1] ? at[3] - at[1] : 0) * ratio + (1300 - n[3]) * each * ratio
-    printf "extrapolated, not measured: %.2f GiB for 1,300 images of 1280 x 1024; the bound is 3\n", all / 1073741824 }'
