@@ -51,7 +51,7 @@ BEGIN {
         "stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype " \
         "dirent dlfcn fcntl fnmatch ftw getopt glob langinfo libgen poll pthread regex sched semaphore spawn strings " \
         "syslog termios unistd sys/file sys/ioctl sys/mman sys/resource sys/select sys/socket sys/stat sys/statvfs " \
-        "sys/sysinfo sys/time sys/types sys/uio sys/wait immintrin arm_neon emmintrin smmintrin cpuid", names, " ")
+        "sys/random sys/sysinfo sys/time sys/types sys/uio sys/un sys/wait immintrin arm_neon emmintrin smmintrin cpuid", names, " ")
     for (i = 1; i <= n; i++)
         c_library[names[i] ".h"] = 1
 }
