@@ -11,8 +11,10 @@
 extern "C" {
 #endif
 
-#define LUMI_RIG_CHANNELS 16 /* trigger outputs of the board */
-#define LUMI_RIG_FEEDBACKS 4 /* exposure-feedback inputs (flash sync) of the board */
+#define LUMI_RIG_CHANNELS 16            /* trigger outputs of the board */
+#define LUMI_RIG_FEEDBACKS 4            /* exposure-feedback inputs (flash sync) of the board */
+#define LUMI_RIG_STEP_RATE_MAX 100000.0 /* steps/s the board makes */
+#define LUMI_RIG_RAMP_MAX 60.0          /* s from rest to speed_max, at most */
 
 /* How the platform is moved. Angles are the platform's. */
 enum lumi_rig_drive_kind {
@@ -47,6 +49,7 @@ struct lumi_rig_trigger {
     int feedback;      /* input 0 .. 3 whose rising edge is the exposure's begin; −1: none */
 };
 
+#define LUMI_RIG_LAMP_BITS 17 /* of the lamp's code at a turn mark: start, 12 of number, 4 of check */
 struct lumi_rig_video {
     double record_pulse; /* s, on the trigger channels, to start and again to stop recording; 0: held while recording */
     double record_lead;  /* s, from the record pulse to the first motion */
@@ -82,7 +85,7 @@ enum lumi_rig_trigger_reaction {
 };
 struct lumi_rig_reaction {
     enum lumi_rig_motor_reaction motor;
-    bool brake; /* closed as well */
+    bool brake; /* closed as well, where one is fitted */
     enum lumi_rig_trigger_reaction triggers;
 };
 
@@ -100,6 +103,9 @@ struct lumi_rig_control {
     struct lumi_rig_video video;
     struct lumi_rig_safety safety;
 };
+
+/* What stands for everything that a profile does not say: camera i on channel i, nothing fitted, an e-stop halts. */
+void lumi_rig_control_init(struct lumi_rig_control *control);
 
 #ifdef __cplusplus
 }

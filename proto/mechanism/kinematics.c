@@ -39,16 +39,28 @@ double lumi_rig_drop(const struct lumi_rig *rig, double turns)
 {
     const struct lumi_rig_string *string = &rig->string;
 
-    if (string->held || !(turns > 0))
+    if (string->held)
         return 0;
     if (string->run == LUMI_RIG_RUN_ARC)
         return fmin(turns * string->per_turn, string->length) / string->hold;
 
     /* sin(angle) = (h² + a² − s²) / (2 h a); the hold falls from hold_angle towards straight down. */
     double h = string->anchor, a = string->hold;
-    double s = fmin(straight_length(string, string->hold_angle) + turns * string->per_turn, string->length);
+    double s = fmax(fmin(straight_length(string, string->hold_angle) + turns * string->per_turn, string->length), 0);
     double sine = (h * h + a * a - s * s) / (2 * h * a);
     return string->hold_angle - asin(fmax(-1, fmin(1, sine)));
+}
+
+double lumi_rig_drop_turns(const struct lumi_rig *rig, double drop)
+{
+    const struct lumi_rig_string *string = &rig->string;
+
+    if (string->held)
+        return 0;
+    if (string->run == LUMI_RIG_RUN_ARC)
+        return drop * string->hold / string->per_turn;
+    return (straight_length(string, string->hold_angle - drop) - straight_length(string, string->hold_angle)) /
+           string->per_turn;
 }
 
 void lumi_rig_camera_pose_at(const struct lumi_rig *rig, int camera, double turn_angle, double drop,

@@ -17,9 +17,12 @@ int64_t lumi_rig_position_step(const struct lumi_rig *rig, int position);
 
 /* The platform's direction after so many turns, radians from +X, counter-clockwise; not reduced to a circle. */
 double lumi_rig_turn_angle(const struct lumi_rig *rig, double turns);
-/* How far every arm angle has fallen after so many turns of unwinding; 0 while held. Beyond the string's end it stays
- * where the string ends. */
+/* How far every arm angle has fallen after so many turns of unwinding; 0 while held. Before the sweep's start (turns
+ * below 0: a sweep runs up to its speed there) the law goes on and the arm is above its place, as far as it can be
+ * lifted. Beyond the string's end it stays where the string ends. */
 double lumi_rig_drop(const struct lumi_rig *rig, double turns);
+/* The turns after which the arm has fallen by `drop`, where it can; 0 while held. */
+double lumi_rig_drop_turns(const struct lumi_rig *rig, double drop);
 
 /* Camera to world, `turns` into the sweep (whole part: the turn; fraction: the place in it). */
 void lumi_rig_camera_pose(const struct lumi_rig *rig, int camera, double turns, struct lumi_pose *pose);

@@ -1,23 +1,22 @@
 /* The rig profile as text: sections, keys, values (docs/rig-profile.md). Reader and writer go by the same table. */
-#include "proto/mechanism/rig.h"
+#include "proto/mechanism/rig_priv.h"
+#include "proto/mechanism/text_priv.h"
 
-#include <errno.h>
-#include <limits.h>
-#include <locale.h>
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#define DEGREE (LUMI_PI / 180)
+/* TRIGGER: keys of a [camera NAME] that say how it is fired. */
+enum section { RIG, DRIVE, SWEEP, STRING, UNCERTAINTY, MOTION, VIDEO, SAFETY, LENS, CAMERA, SECTIONS, TRIGGER };
+static const char *const section_names[SECTIONS] = {"rig",    "drive", "sweep",  "string", "uncertainty",
+                                                    "motion", "video", "safety", "lens",   "camera"};
+/* May be missing: nothing is uncertain, or what lumi_rig_control_init says holds. */
+static const bool optional[SECTIONS] = {[UNCERTAINTY] = true, [MOTION] = true, [VIDEO] = true, [SAFETY] = true};
 
-enum section { RIG, DRIVE, SWEEP, STRING, UNCERTAINTY, LENS, CAMERA, SECTIONS };
-static const char *const section_names[SECTIONS] = {"rig", "drive", "sweep", "string", "uncertainty", "lens", "camera"};
-
-enum kind { WORD, INTEGER, REAL, ANGLE, YES_NO, RUN, MODEL, LENS_NAME };
+enum kind { WORD, INTEGER, REAL, ANGLE, RATE, RATE2, RATE3, YES_NO, RUN, MODEL, DRIVE_KIND, LINE, REACTION, LENS_NAME };
 
 /* An ANGLE is written as "<name>_deg", or as "<name>_rad" where no decimal number of degrees gives the very same
- * radians. */
+ * radians; a RATE as "<name>_deg_s" (or _rad_s), its changes as "_deg_s2" and "_deg_s3". */
+static const char *const per_time[] = {[ANGLE] = "", [RATE] = "_s", [RATE2] = "_s2", [RATE3] = "_s3"};
 static const struct key {
     enum section section;
     const char *name;
@@ -44,6 +43,40 @@ static const struct key {
     {UNCERTAINTY, "rotation", ANGLE, offsetof(struct lumi_rig, uncertainty.rotation)},
     {UNCERTAINTY, "turn", ANGLE, offsetof(struct lumi_rig, uncertainty.turn)},
     {UNCERTAINTY, "drop", ANGLE, offsetof(struct lumi_rig, uncertainty.drop)},
+    {MOTION, "drive", DRIVE_KIND, offsetof(struct lumi_rig, control.motion.drive)},
+    {MOTION, "speed_max", RATE, offsetof(struct lumi_rig, control.motion.speed_max)},
+    {MOTION, "acceleration_max", RATE2, offsetof(struct lumi_rig, control.motion.acceleration_max)},
+    {MOTION, "jerk_max", RATE3, offsetof(struct lumi_rig, control.motion.jerk_max)},
+    {MOTION, "home_speed", RATE, offsetof(struct lumi_rig, control.motion.home_speed)},
+    {MOTION, "wind_speed", RATE, offsetof(struct lumi_rig, control.motion.wind_speed)},
+    {MOTION, "backlash", ANGLE, offsetof(struct lumi_rig, control.motion.backlash)},
+    {MOTION, "index_window", ANGLE, offsetof(struct lumi_rig, control.motion.index_window)},
+    {MOTION, "settle_s", REAL, offsetof(struct lumi_rig, control.motion.settle)},
+    {MOTION, "step_pulse_s", REAL, offsetof(struct lumi_rig, control.motion.step_pulse)},
+    {MOTION, "direction_setup_s", REAL, offsetof(struct lumi_rig, control.motion.direction_setup)},
+    {VIDEO, "record_pulse_s", REAL, offsetof(struct lumi_rig, control.video.record_pulse)},
+    {VIDEO, "record_lead_s", REAL, offsetof(struct lumi_rig, control.video.record_lead)},
+    {VIDEO, "lamp_bit_s", REAL, offsetof(struct lumi_rig, control.video.lamp_bit)},
+    {SAFETY, "host_timeout_s", REAL, offsetof(struct lumi_rig, control.safety.host_timeout)},
+    {SAFETY, "supply_minimum_v", REAL, offsetof(struct lumi_rig, control.safety.supply_minimum)},
+    {SAFETY, "overspeed", RATE, offsetof(struct lumi_rig, control.safety.overspeed)},
+    {SAFETY, "brake_fitted", YES_NO, offsetof(struct lumi_rig, control.safety.brake_fitted)},
+    {SAFETY, "slack_fitted", YES_NO, offsetof(struct lumi_rig, control.safety.slack_fitted)},
+    {SAFETY, "string_end_fitted", YES_NO, offsetof(struct lumi_rig, control.safety.string_end_fitted)},
+    {SAFETY, "wound_fitted", YES_NO, offsetof(struct lumi_rig, control.safety.wound_fitted)},
+    {SAFETY, "driver_fault_fitted", YES_NO, offsetof(struct lumi_rig, control.safety.driver_fault_fitted)},
+    {SAFETY, "estop", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_ESTOP])},
+    {SAFETY, "host-lost", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_HOST_LOST])},
+    {SAFETY, "index-missed", REACTION,
+     offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_INDEX_MISSED])},
+    {SAFETY, "index-early", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_INDEX_EARLY])},
+    {SAFETY, "string-end", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_STRING_END])},
+    {SAFETY, "slack", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_SLACK])},
+    {SAFETY, "overspeed", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_OVERSPEED])},
+    {SAFETY, "driver", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_DRIVER])},
+    {SAFETY, "supply", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_SUPPLY])},
+    {SAFETY, "internal", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_INTERNAL])},
+    {SAFETY, "watchdog", REACTION, offsetof(struct lumi_rig, control.safety.reactions[LUMI_RIG_FAULT_WATCHDOG])},
     {LENS, "model", MODEL, offsetof(struct lumi_rig_lens, lens.model)},
     {LENS, "width", INTEGER, offsetof(struct lumi_rig_lens, lens.width)},
     {LENS, "height", INTEGER, offsetof(struct lumi_rig_lens, lens.height)},
@@ -65,49 +98,24 @@ static const struct key {
     {CAMERA, "pan", ANGLE, offsetof(struct lumi_rig_camera, pan)},
     {CAMERA, "tilt", ANGLE, offsetof(struct lumi_rig_camera, tilt)},
     {CAMERA, "offset_m", REAL, offsetof(struct lumi_rig_camera, offset_m)},
+    {TRIGGER, "channel", LINE, offsetof(struct lumi_rig_trigger, channel)},
+    {TRIGGER, "shutter_lag_s", REAL, offsetof(struct lumi_rig_trigger, shutter_lag)},
+    {TRIGGER, "pulse_s", REAL, offsetof(struct lumi_rig_trigger, pulse)},
+    {TRIGGER, "focus_lead_s", REAL, offsetof(struct lumi_rig_trigger, focus_lead)},
+    {TRIGGER, "focus_channel", LINE, offsetof(struct lumi_rig_trigger, focus_channel)},
+    {TRIGGER, "busy_s", REAL, offsetof(struct lumi_rig_trigger, busy)},
+    {TRIGGER, "feedback", LINE, offsetof(struct lumi_rig_trigger, feedback)},
 };
 #define KEYS ((int)(sizeof keys / sizeof *keys))
 
 static const char *const model_names[] = {"pinhole", "fisheye"}; /* LUMI_LENS_BROWN, LUMI_LENS_FISHEYE */
+static const char *const drive_names[] = {"stepper", "external"};
+static const char *const motor_words[] = {"row-end", "ramp", "halt", "off"};
+static const char *const trigger_words[] = {"triggers-finish", "triggers-off"};
 
-/* ---- Numbers ---- */
-
-/* strtod and printf take the decimal point from the program's locale; profiles always have '.'. */
-static char locale_point(void)
+static bool in_section(const struct key *key, enum section section)
 {
-    const struct lconv *conventions = localeconv();
-
-    return conventions && conventions->decimal_point[0] ? conventions->decimal_point[0] : '.';
-}
-
-static bool read_real(const char *text, double *value)
-{
-    char copy[64], *end;
-    size_t length = strlen(text);
-
-    if (length == 0 || length >= sizeof copy || strspn(text, "+-.0123456789eE") != length)
-        return false;
-    memcpy(copy, text, length + 1);
-    for (char *c = copy; *c; c++)
-        if (*c == '.')
-            *c = locale_point();
-    *value = strtod(copy, &end);
-    return *end == '\0' && isfinite(*value);
-}
-
-/* The shortest decimal number that reads as `value` after scaling by `unit`; false if there is none. */
-static bool print_real(double value, double unit, char text[40])
-{
-    for (int digits = 1; digits <= 17; digits++) {
-        double back;
-        snprintf(text, 40, "%.*g", digits, value / unit);
-        for (char *c = text; *c; c++)
-            if (*c == locale_point())
-                *c = '.';
-        if (read_real(text, &back) && back * unit == value)
-            return true;
-    }
-    return false;
+    return key->section == section || (key->section == TRIGGER && section == CAMERA);
 }
 
 /* ---- Reading ---- */
@@ -133,17 +141,6 @@ static int place(const struct parser *p)
     return lumi_fail_prefix(p->error, "%s:%d", p->source, p->line);
 }
 
-static char *trim(char *text)
-{
-    char *end;
-
-    text += strspn(text, " \t\r");
-    end = text + strlen(text);
-    while (end > text && strchr(" \t\r", end[-1]))
-        *--end = '\0';
-    return text;
-}
-
 static int open_section(struct parser *p, char *text)
 {
     char *name = strpbrk(text, " \t");
@@ -151,7 +148,7 @@ static int open_section(struct parser *p, char *text)
 
     if (name) {
         *name++ = '\0';
-        name = trim(name);
+        name = text_trim(name);
     }
     for (s = 0; s < SECTIONS && strcmp(text, section_names[s]); s++)
         ;
@@ -189,10 +186,52 @@ static void *target(struct lumi_rig *rig, const struct key *key, int index)
         base = (char *)&rig->lenses[index];
     else if (key->section == CAMERA)
         base = (char *)&rig->cameras[index];
+    else if (key->section == TRIGGER)
+        base = (char *)&rig->control.triggers[index];
     return base + key->offset;
 }
 
-static int set_value(struct parser *p, const struct key *key, double unit, const char *value)
+/* "halt, brake, triggers-off": what the motor does, whether the brake closes, what the triggers do; in any order. */
+static int set_reaction(struct parser *p, const char *name, char *value, struct lumi_rig_reaction *reaction)
+{
+    int motors = 0, brakes = 0, triggers = 0;
+
+    reaction->brake = false;
+    for (char *word = value, *next; word; word = next) {
+        int known = motors + brakes + triggers;
+        next = strchr(word, ',');
+        if (next)
+            *next++ = '\0';
+        word = text_trim(word);
+        for (int i = LUMI_RIG_MOTOR_ROW_END; i <= LUMI_RIG_MOTOR_OFF; i++)
+            if (!strcmp(word, motor_words[i])) {
+                reaction->motor = (enum lumi_rig_motor_reaction)i;
+                motors++;
+            }
+        for (int i = LUMI_RIG_TRIGGERS_FINISH; i <= LUMI_RIG_TRIGGERS_OFF; i++)
+            if (!strcmp(word, trigger_words[i])) {
+                reaction->triggers = (enum lumi_rig_trigger_reaction)i;
+                triggers++;
+            }
+        if (!strcmp(word, "brake")) {
+            reaction->brake = true;
+            brakes++;
+        }
+        if (motors + brakes + triggers == known)
+            return FAIL(LUMI_ERR_FORMAT,
+                        "%s: '%s' is none of row-end, ramp, halt, off, brake, triggers-finish, "
+                        "triggers-off",
+                        name, word);
+    }
+    if (motors != 1 || brakes > 1 || triggers != 1)
+        return FAIL(LUMI_ERR_FORMAT,
+                    "%s: one of row-end, ramp, halt, off and one of triggers-finish, triggers-off "
+                    "wanted",
+                    name);
+    return LUMI_OK;
+}
+
+static int set_value(struct parser *p, const struct key *key, double unit, char *value)
 {
     void *at = target(p->rig, key, p->index);
     double number;
@@ -205,13 +244,20 @@ static int set_value(struct parser *p, const struct key *key, double unit, const
         memcpy(key->kind == WORD ? (char *)at : p->lens_of[p->index], value, strlen(value) + 1);
         return LUMI_OK;
     case INTEGER:
-        if (!read_real(value, &number) || number != floor(number) || fabs(number) > 1e9)
+        if (!text_read_integer(value, at))
             return FAIL(LUMI_ERR_FORMAT, "%s: '%s' is no whole number", key->name, value);
-        *(int *)at = (int)number;
+        return LUMI_OK;
+    case LINE:
+        *(int *)at = -1;
+        if (strcmp(value, "none") && !text_read_integer(value, at))
+            return FAIL(LUMI_ERR_FORMAT, "%s: '%s' is neither a whole number nor none", key->name, value);
         return LUMI_OK;
     case REAL:
     case ANGLE:
-        if (!read_real(value, &number))
+    case RATE:
+    case RATE2:
+    case RATE3:
+        if (!text_read_real(value, &number))
             return FAIL(LUMI_ERR_FORMAT, "%s: '%s' is no number", key->name, value);
         *(double *)at = number * unit;
         return LUMI_OK;
@@ -230,8 +276,21 @@ static int set_value(struct parser *p, const struct key *key, double unit, const
             return FAIL(LUMI_ERR_FORMAT, "%s: '%s' is neither pinhole nor fisheye", key->name, value);
         *(enum lumi_lens_model *)at = strcmp(value, model_names[0]) ? LUMI_LENS_FISHEYE : LUMI_LENS_BROWN;
         return LUMI_OK;
+    case DRIVE_KIND:
+        if (strcmp(value, drive_names[0]) && strcmp(value, drive_names[1]))
+            return FAIL(LUMI_ERR_FORMAT, "%s: '%s' is neither stepper nor external", key->name, value);
+        *(enum lumi_rig_drive_kind *)at =
+            strcmp(value, drive_names[0]) ? LUMI_RIG_DRIVE_EXTERNAL : LUMI_RIG_DRIVE_STEPPER;
+        return LUMI_OK;
+    case REACTION:
+        return set_reaction(p, key->name, value, at);
     }
     return LUMI_ERR_INTERNAL;
+}
+
+static bool is_angle(const struct key *key)
+{
+    return key->kind == ANGLE || key->kind == RATE || key->kind == RATE2 || key->kind == RATE3;
 }
 
 /* Whether `name` is the key's name, with the unit an angle carries. */
@@ -242,18 +301,19 @@ static bool key_matches(const struct key *key, const char *name, double *unit)
     *unit = 1;
     if (strncmp(name, key->name, length))
         return false;
-    if (key->kind != ANGLE)
+    if (!is_angle(key))
         return name[length] == '\0';
-    if (!strcmp(name + length, "_deg"))
-        *unit = DEGREE;
-    else if (strcmp(name + length, "_rad"))
+    name += length;
+    if (!strncmp(name, "_deg", 4))
+        *unit = RIG_DEGREE;
+    else if (strncmp(name, "_rad", 4))
         return false;
-    return true;
+    return !strcmp(name + 4, per_time[key->kind]);
 }
 
 static int parse_line(struct parser *p, char *line)
 {
-    char *text = trim(line), *equals;
+    char *text = text_trim(line), *value;
     double unit;
 
     if (*text == '\0' || *text == '#' || *text == ';')
@@ -263,21 +323,18 @@ static int parse_line(struct parser *p, char *line)
         if (text[length - 1] != ']')
             return FAIL(LUMI_ERR_FORMAT, "a section's ']' is missing");
         text[length - 1] = '\0';
-        return open_section(p, trim(text + 1));
+        return open_section(p, text_trim(text + 1));
     }
-    equals = strchr(text, '=');
-    if (!equals)
+    if (!text_split(text, &value))
         return FAIL(LUMI_ERR_FORMAT, "neither a section nor 'key = value'");
     if (p->section == SECTIONS)
         return FAIL(LUMI_ERR_FORMAT, "a key before the first section");
-    *equals = '\0';
-    text = trim(text);
     for (int i = 0; i < KEYS; i++)
-        if (keys[i].section == p->section && key_matches(&keys[i], text, &unit)) {
+        if (in_section(&keys[i], p->section) && key_matches(&keys[i], text, &unit)) {
             if (p->set[i])
                 return FAIL(LUMI_ERR_FORMAT, "'%s' comes twice", text);
             p->set[i] = true;
-            return set_value(p, &keys[i], unit, trim(equals + 1));
+            return set_value(p, &keys[i], unit, value);
         }
     return FAIL(LUMI_ERR_FORMAT, "section '%s' has no key '%s'", section_names[p->section], text);
 }
@@ -300,26 +357,22 @@ static int resolve_lenses(struct parser *p)
 int lumi_rig_parse(const char *text, size_t size, const char *source, struct lumi_rig *rig, struct lumi_error *error)
 {
     struct parser parser = {.rig = rig, .source = source, .error = error, .section = SECTIONS};
-    char line[256];
+    char line[TEXT_LINE];
 
     memset(rig, 0, sizeof *rig);
+    lumi_rig_control_init(&rig->control);
     if (size > LUMI_RIG_TEXT_MAX)
         return lumi_fail(error, LUMI_ERR_LIMIT, "%s: a profile of %zu bytes, at most %d are read", source, size,
                          LUMI_RIG_TEXT_MAX);
     for (size_t at = 0; at < size;) {
-        const char *end = memchr(text + at, '\n', size - at);
-        size_t length = end ? (size_t)(end - text) - at : size - at;
         struct parser *p = &parser;
         p->line++;
-        if (length >= sizeof line || memchr(text + at, '\0', length))
+        if (!text_line(text, size, &at, line))
             return FAIL(LUMI_ERR_FORMAT, "the line is too long or no text");
-        memcpy(line, text + at, length);
-        line[length] = '\0';
         LUMI_TRY(parse_line(p, line));
-        at += length + 1;
     }
     for (int s = 0; s < SECTIONS; s++)
-        if (!parser.seen[s] && s != UNCERTAINTY)
+        if (!parser.seen[s] && !optional[s])
             return lumi_fail(error, LUMI_ERR_FORMAT, "%s: section '%s' is missing", source, section_names[s]);
     LUMI_TRY(resolve_lenses(&parser));
     if (lumi_rig_check(rig, error) != LUMI_OK)
@@ -329,58 +382,47 @@ int lumi_rig_parse(const char *text, size_t size, const char *source, struct lum
 
 /* ---- Writing ---- */
 
-struct printer {
-    char *text;
-    size_t size, length;
-};
-
-static void put(struct printer *printer, const char *string)
-{
-    size_t length = strlen(string);
-
-    if (printer->length < printer->size) {
-        size_t room = printer->size - printer->length - 1, count = length < room ? length : room;
-        memcpy(printer->text + printer->length, string, count);
-        printer->text[printer->length + count] = '\0';
-    }
-    printer->length += length;
-}
-
-static void put_pair(struct printer *printer, const char *key, const char *unit, const char *value)
-{
-    put(printer, key);
-    put(printer, unit);
-    put(printer, " = ");
-    put(printer, value);
-    put(printer, "\n");
-}
-
-static void put_key(struct printer *printer, const struct lumi_rig *rig, const struct key *key, int index)
+static void put_key(struct text_printer *printer, const struct lumi_rig *rig, const struct key *key, int index)
 {
     const void *at = target((struct lumi_rig *)rig, key, index);
-    const char *unit = "";
-    char text[40];
+    char text[TEXT_NUMBER];
 
     switch (key->kind) {
     case WORD:
-        put_pair(printer, key->name, unit, at);
+        text_put_pair(printer, key->name, "", at);
         return;
     case LENS_NAME:
-        put_pair(printer, key->name, unit, rig->lenses[rig->cameras[index].lens].name);
+        text_put_pair(printer, key->name, "", rig->lenses[rig->cameras[index].lens].name);
         return;
     case INTEGER:
         snprintf(text, sizeof text, "%d", *(const int *)at);
         break;
     case REAL:
-        print_real(*(const double *)at, 1, text);
+        text_print_real(*(const double *)at, 1, text);
         break;
     case ANGLE:
-        unit = "_deg";
-        if (!print_real(*(const double *)at, DEGREE, text)) {
-            unit = "_rad";
-            print_real(*(const double *)at, 1, text);
-        }
+    case RATE:
+    case RATE2:
+    case RATE3: {
+        bool degrees = text_print_real(*(const double *)at, RIG_DEGREE, text);
+        if (!degrees)
+            text_print_real(*(const double *)at, 1, text);
+        text_put(printer, key->name);
+        text_put_pair(printer, degrees ? "_deg" : "_rad", per_time[key->kind], text);
+        return;
+    }
+    case LINE:
+        snprintf(text, sizeof text, *(const int *)at < 0 ? "none" : "%d", *(const int *)at);
         break;
+    case DRIVE_KIND:
+        snprintf(text, sizeof text, "%s", drive_names[*(const enum lumi_rig_drive_kind *)at]);
+        break;
+    case REACTION: {
+        const struct lumi_rig_reaction *reaction = at;
+        snprintf(text, sizeof text, "%s, %s%s", motor_words[reaction->motor], reaction->brake ? "brake, " : "",
+                 trigger_words[reaction->triggers]);
+        break;
+    }
     case YES_NO:
         snprintf(text, sizeof text, "%s", *(const bool *)at ? "yes" : "no");
         break;
@@ -391,29 +433,29 @@ static void put_key(struct printer *printer, const struct lumi_rig *rig, const s
         snprintf(text, sizeof text, "%s", model_names[*(const enum lumi_lens_model *)at == LUMI_LENS_FISHEYE]);
         break;
     }
-    put_pair(printer, key->name, unit, text);
+    text_put_pair(printer, key->name, "", text);
 }
 
-static void put_section(struct printer *printer, const struct lumi_rig *rig, enum section section, const char *name,
-                        int index)
+static void put_section(struct text_printer *printer, const struct lumi_rig *rig, enum section section,
+                        const char *name, int index)
 {
-    put(printer, printer->length ? "\n[" : "[");
-    put(printer, section_names[section]);
+    text_put(printer, printer->length ? "\n[" : "[");
+    text_put(printer, section_names[section]);
     if (name) {
-        put(printer, " ");
-        put(printer, name);
+        text_put(printer, " ");
+        text_put(printer, name);
     }
-    put(printer, "]\n");
+    text_put(printer, "]\n");
     for (int i = 0; i < KEYS; i++)
-        if (keys[i].section == section)
+        if (in_section(&keys[i], section))
             put_key(printer, rig, &keys[i], index);
 }
 
 size_t lumi_rig_print(const struct lumi_rig *rig, char *text, size_t size)
 {
-    struct printer printer = {text, size, 0};
+    struct text_printer printer = {text, size, 0};
 
-    for (int s = RIG; s <= UNCERTAINTY; s++)
+    for (int s = RIG; s < LENS; s++)
         put_section(&printer, rig, (enum section)s, NULL, 0);
     for (int i = 0; i < rig->lens_count; i++)
         put_section(&printer, rig, LENS, rig->lenses[i].name, i);

@@ -30,8 +30,8 @@ struct lumi_plan {
     int first_turn, turns; /* the sweep covers turns first_turn .. first_turn + turns − 1 of the profile's string */
     double turn_time;      /* s a turn: continuous and video; start-stop: how long a turn takes in all. */
     double position_time;  /* s from position to position, start-stop; 0: turn_time / positions */
-    double settle;         /* s, start-stop; below 0: the profile's */
-    int bracket;           /* shots a position, 1 … 9; more than one in start-stop only */
+    double settle; /* s, start-stop: from the last step of a move to the first exposure; below 0: the profile's */
+    int bracket;   /* shots a position, 1 … 9; more than one in start-stop only */
     double exposures[LUMI_PLAN_BRACKET]; /* s, of each, in the order they are taken */
     double bracket_gap; /* s, between the end of one exposure and the trigger of the next, at least; the cameras'
                            busy time rules if longer */
@@ -41,27 +41,55 @@ struct lumi_plan {
 /* The paper's limit: 1/250 s at 12°/s and 20 pixels a degree smear 0.96 of a pixel (Overbeck et al. 2018, section 3).
  */
 #define LUMI_PLAN_BLUR 1.0
+#define LUMI_PLAN_PULSE_GAP 0.005 /* s a trigger line is low between two pulses, at least */
 
 /* One turn count, 72 positions, 30 s, continuous, one exposure of 1/250 s, all cameras: what `rig` is meant for. */
 void lumi_plan_init(struct lumi_plan *plan, const struct lumi_rig *rig);
 
 /* Whether this rig can do it: LUMI_ERR_FORMAT with the reason (outruns the motor, the cameras or the positions' time;
- * blurs; more turns than string; drop with a brake that holds; too many shots). */
+ * blurs; more turns than string; drop with a brake that holds; too many shots). For a rig that passed lumi_rig_check;
+ * what follows is for plans that passed this. */
 int lumi_plan_check(const struct lumi_plan *plan, const struct lumi_rig *rig, struct lumi_error *error);
 
-/* Shots are numbered 0 … lumi_plan_shots − 1 in the order they are taken: bracket fastest, then position, then turn.
- * Frames: shots times cameras. Seconds: from the first motion of the sweep itself (run-up) to the last, without homing
- * and winding. */
+/* Shots are numbered 0 … lumi_plan_shots − 1 in the order they are taken: bracket fastest, then position, then turn; a
+ * video has none. Frames: shots times cameras. Seconds: from the first motion of the sweep itself (run-up) to the last
+ * motion or exposure, without homing, winding and the lead of a video. */
 int lumi_plan_shots(const struct lumi_plan *plan);
 int lumi_plan_frames(const struct lumi_plan *plan, const struct lumi_rig *rig);
 double lumi_plan_seconds(const struct lumi_plan *plan, const struct lumi_rig *rig);
-/* How far in pixels one exposure smears at the sphere's equator while turning; the largest of all cameras. */
+/* How far in pixels one exposure smears at the sphere's equator while turning; the largest of all cameras. 0 in
+ * start-stop. */
 double lumi_plan_blur(const struct lumi_plan *plan, const struct lumi_rig *rig);
 
-/* The text form (docs/rig-plan.md), as with rig profiles. */
+/* Bit a camera that takes part: the plan's, or all that have a channel. */
+uint32_t lumi_plan_cameras(const struct lumi_plan *plan, const struct lumi_rig *rig);
+/* The step nearest to position `position` of the plan (0: at the beginning of first_turn), without drift. */
+int64_t lumi_plan_position_step(const struct lumi_plan *plan, const struct lumi_rig *rig, int position);
+
+/* Start-stop. Seconds from position to position, from the last step of a move to the first exposure's begin, and from
+ * there to the begin of exposure `k` of the bracket. The next move begins position_seconds after the one before. */
+double lumi_plan_position_seconds(const struct lumi_plan *plan);
+double lumi_plan_settle(const struct lumi_plan *plan, const struct lumi_rig *rig);
+double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi_rig *rig, int k);
+/* Least seconds from the begin of exposure `k` to the begin of the next, whatever comes next: until every camera takes
+ * a trigger again and its lines have been low. */
+double lumi_plan_exposure_spacing(const struct lumi_plan *plan, const struct lumi_rig *rig, int k);
+
+/* Continuous and video: the platform's speed; where it starts from rest before position 0, and where it may come to
+ * rest behind the sweep's last place, in turns. Within the run-up it has reached its speed and then swung out for the
+ * profile's settle time. */
+double lumi_plan_speed(const struct lumi_plan *plan); /* rad/s */
+double lumi_plan_run_up(const struct lumi_plan *plan, const struct lumi_rig *rig);
+double lumi_plan_run_down(const struct lumi_plan *plan, const struct lumi_rig *rig);
+/* From position 0 to the last place of the sweep, in turns: the last position, or for a video the end of its last turn.
+ */
+double lumi_plan_span(const struct lumi_plan *plan);
+
+/* The text form (docs/rig-plan.md), as with rig profiles; cameras are called by the rig's names. Parsing begins with
+ * lumi_plan_init and ends with lumi_plan_check. */
 int lumi_plan_parse(const char *text, size_t size, const char *source, const struct lumi_rig *rig,
                     struct lumi_plan *plan, struct lumi_error *error);
-size_t lumi_plan_print(const struct lumi_plan *plan, char *text, size_t size);
+size_t lumi_plan_print(const struct lumi_plan *plan, const struct lumi_rig *rig, char *text, size_t size);
 #define LUMI_PLAN_TEXT_MAX 4096
 
 #ifdef __cplusplus
