@@ -41,6 +41,7 @@ enum board_reset { BOARD_RESET_POWER = 0, BOARD_RESET_PIN, BOARD_RESET_SOFTWARE,
 #define BOARD_PROFILE_SLOT_SIZE 16384 /* bytes; a slot is erased as a whole */
 
 struct board {
+    const char *name; /* what the host is told it talks to: "stm32f405", "host" */
     void *port;
 
     uint64_t (*now)(void *port);
@@ -52,7 +53,7 @@ struct board {
      * port calls core_on_step, which returns the ticks from pulse k + 1 to pulse k + 2 (0: pulse k + 1 is the last), so
      * that a timer with a preloaded period has it a whole period early. `forward` sets the direction pin at once. */
     void (*steps_start)(void *port, uint64_t at, bool forward, uint32_t first);
-    /* Not one pulse more that has not begun to rise. Callable from interrupts. */
+    /* Not one pulse more that has not begun to rise. Callable from interrupts, as output is. */
     void (*steps_stop)(void *port);
     void (*step_pulse_width)(void *port, uint32_t ticks);
 
@@ -69,6 +70,8 @@ struct board {
     enum board_reset (*reset_cause)(void *port);
     void (*watchdog_kick)(void *port);
     void (*unique_id)(void *port, uint8_t id[BOARD_UNIQUE_ID]);
+    /* Another number after every restart, as far as the board can make one (its noise source). Asked once. */
+    uint32_t (*boot_number)(void *port);
 
     /* Bytes of a link; never block; return how many were taken. `link_up`: somebody is there, as far as one can tell.
      */

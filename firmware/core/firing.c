@@ -1,4 +1,5 @@
-/* Shots: what each wants of the lines, which may be taken, what became of them. The lines themselves: firing_lines.c. */
+/* Shots: what each wants of the lines, which may be taken, what became of them. The lines themselves: firing_lines.c.
+ */
 #include "firmware/core/firing_state.h"
 
 #define LINE_GAP_TICKS (BOARD_TICK_HZ / 1000) /* a trigger line is down at least 1 ms before it goes up again */
@@ -70,8 +71,7 @@ static void set_state(struct firing *firing, uint32_t number, enum shot_state st
     firing->fired += (state == SHOT_FIRED) - (old == SHOT_FIRED);
     firing->lost += (state == SHOT_LOST) - (old == SHOT_LOST);
     unsigned shift = number % 4 * 2;
-    firing->states[number / 4] =
-        (uint8_t)((firing->states[number / 4] & ~(3u << shift)) | (unsigned)state << shift);
+    firing->states[number / 4] = (uint8_t)((firing->states[number / 4] & ~(3u << shift)) | (unsigned)state << shift);
 }
 
 void firing_plan_again(struct firing *firing, uint32_t first, uint32_t count)

@@ -4,8 +4,9 @@
  * 1. A shot has a number and is in one of the states below, kept for the whole sweep in two bits a shot. It leaves
  *    PLANNED once, and every change is an event. FIRED means: every line of it went up at its time, within
  *    FIRING_LATE_TICKS, and nothing stopped it before the last exposure's end.
- * 2. Edges are queued ahead by the main loop and put out by the board's trigger timer, one pattern at a time; edges that
- *    fall on one tick are one pattern. Lines of one shot and the next may overlap: a line is up while anybody holds it.
+ * 2. Edges are queued ahead by the main loop and put out by the board's trigger timer, one pattern at a time; edges
+ * that fall on one tick are one pattern. Lines of one shot and the next may overlap: a line is up while anybody holds
+ * it.
  * 3. A camera that would still be busy when its trigger comes is not triggered: the shot is lost, and said to be.
  * 4. The board's trigger timer calls firing_on_trigger from an interrupt, never from within trigger_at. */
 #ifndef LUMI_FIRMWARE_CORE_FIRING_H
@@ -30,12 +31,12 @@ struct firing; /* firing_state.h */
 struct shot_record {
     uint32_t number;
     enum shot_state state;
-    int exposure;      /* which of its position's bracket */
-    uint32_t cameras;  /* bit a camera whose trigger rose */
-    uint16_t lines;    /* their trigger outputs */
-    uint64_t middle;   /* planned tick of the exposures' middle */
-    int64_t edge[16];  /* ticks from `middle` to the rising edge of trigger output i, where it rose */
-    double position;   /* steps, at `middle` */
+    int exposure;     /* which of its position's bracket */
+    uint32_t cameras; /* bit a camera whose trigger rose */
+    uint16_t lines;   /* their trigger outputs */
+    uint64_t middle;  /* planned tick of the exposures' middle */
+    int64_t edge[16]; /* ticks from `middle` to the rising edge of trigger output i, where it rose */
+    double position;  /* steps, at `middle` */
 };
 /* Called from firing_poll and firing_shoot. */
 typedef void (*firing_report)(void *context, const struct shot_record *record);

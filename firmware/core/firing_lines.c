@@ -23,7 +23,7 @@ static uint16_t apply(const struct firing_edge *edge, uint8_t holds[LUMI_RIG_CHA
             holds[bit]++;
     for (unsigned bit = 0, left = edge->fall; left != 0; bit++, left >>= 1)
         if ((left & 1) && holds[bit] > 0 && --holds[bit] == 0)
-            lines &= (uint16_t)~(1u << bit);
+            lines &= (uint16_t) ~(1u << bit);
     return lines | edge->rise;
 }
 
@@ -75,7 +75,8 @@ bool firing_queue(struct firing *firing, const struct firing_edge *edge, uint32_
     bool open = firing->stops == stops && firing->edge_count < FIRING_EDGES && firing->gate != GATE_OFF;
 
     if (open) {
-        /* Edges come at least SHOOT_MARGIN ahead: a pending pattern that this one goes before is not about to go out. */
+        /* Edges come at least SHOOT_MARGIN ahead: a pending pattern that this one goes before is not about to go out.
+         */
         bool again = firing->armed > 0 && edge->at <= edge_at(firing, 0)->at;
         insert(firing, edge);
         if (again)

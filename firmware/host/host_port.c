@@ -227,9 +227,21 @@ static void port_restart(void *port)
     board->cause = BOARD_RESET_SOFTWARE;
 }
 
+/* No noise here: starts are counted, and boards differ. */
+static uint32_t port_boot_number(void *port)
+{
+    const struct host_board *board = port;
+    uint32_t mixed = board->counts.resets + 1;
+
+    for (int i = 0; i < BOARD_UNIQUE_ID; i++)
+        mixed = (mixed ^ board->id[i]) * 0x01000193u; /* FNV-1a (Fowler, Noll, Vo) */
+    return mixed;
+}
+
 void host_port_init(struct host_board *board)
 {
     board->port = (struct board){
+        .name = "host",
         .port = board,
         .now = port_now,
         .lock = port_lock,
@@ -247,6 +259,7 @@ void host_port_init(struct host_board *board)
         .reset_cause = port_reset_cause,
         .watchdog_kick = port_watchdog_kick,
         .unique_id = port_unique_id,
+        .boot_number = port_boot_number,
         .link_read = port_link_read,
         .link_write = port_link_write,
         .link_up = port_link_up,
