@@ -1,0 +1,1 @@
+lumi_test(test_motion FOLDERS firmware_core)
