@@ -81,7 +81,7 @@ bool lumi_rig_link_notice(struct lumi_rig_link *link, double seconds, struct lum
 struct lumi_rig_link_snapshot {
     enum lumi_rig_link_state state;
     int code; /* why there is no session */
-    char text[512];
+    char text[1024];
     char name[LUMI_RIG_STREAM_NAME]; /* of the stream */
     lumi_wire_Welcome welcome;       /* of the last session */
     bool status_known;

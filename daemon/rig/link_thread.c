@@ -167,7 +167,7 @@ static void set_state(struct lumi_rig_link *link, enum lumi_rig_link_state state
     link->snapshot.state = state;
     link->snapshot.code = code;
     if (text != link->snapshot.text)
-        snprintf(link->snapshot.text, sizeof link->snapshot.text, "%s", text);
+        g_strlcpy(link->snapshot.text, text, sizeof link->snapshot.text);
     if (changed)
         pthread_cond_broadcast(&link->changed);
 }
@@ -181,7 +181,7 @@ static void close_stream(struct lumi_rig_link *link, enum lumi_rig_link_state st
     link->out_size = 0;
     link->try_ns = link->now_ns + (state == LUMI_RIG_LINK_FOREIGN ? FOREIGN_RETRY_NS : RETRY_NS);
     set_state(link, state, code, text);
-    snprintf(notice.text, sizeof notice.text, "%s", text);
+    g_strlcpy(notice.text, text, sizeof notice.text);
     keep(link, &notice);
 }
 
@@ -219,7 +219,7 @@ static void judge(struct lumi_rig_link *link)
     const struct lumi_wire_client *client = &link->client;
     double quiet = (double)(link->now_ns - link->heard_ns) * 1e-9;
     double unanswered;
-    char text[512];
+    char text[1024];
 
     if (!link->open)
         return;

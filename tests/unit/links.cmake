@@ -1,0 +1,1 @@
+lumi_test(test_clock_match FOLDERS daemon_rig)
