@@ -4,7 +4,11 @@
  * 1. A request is executed if its token is a live session's and its number is the last one's plus one. The last one's
  *    reply is kept and sent again when its request comes again; anything else is answered NO_SESSION or OUT_OF_ORDER.
  * 2. Up to LUMI_WIRE_SESSIONS hosts are remembered; the one that was silent longest goes when another says Hello.
- * 3. A Hello never changes a session that is there, so that late or doubled ones do no harm. */
+ * 3. A Hello never changes a session that is there, so that late or doubled ones do no harm. A session belongs to no
+ *    link: its host may go on over another.
+ * 4. Tokens are mixed of boot, host, a count and the time: a request of an earlier boot or session fits none.
+ * 5. Events go to the link whose host last sent a heartbeat that is no observer's, and only while it goes on doing so.
+ *    A heartbeat of any other host than before, or over another link, begins again with the oldest event. */
 #ifndef LUMI_PROTO_WIRE_SERVER_H
 #define LUMI_PROTO_WIRE_SERVER_H
 
@@ -17,24 +21,29 @@ extern "C" {
 
 #define LUMI_WIRE_SESSIONS 4
 #define LUMI_WIRE_LINKS 2
-#define LUMI_WIRE_EVENT_RESEND_NS 250000000u /* an event that is not acknowledged is sent again after this */
+#define LUMI_WIRE_EVENT_RESEND_NS 250000000u /* events that are not acknowledged are sent again after this */
+#define LUMI_WIRE_SILENCE_NS 3000000000u     /* a host without a heartbeat for this gets no more events */
 
 struct lumi_wire_session {
-    uint64_t host;
-    uint32_t token, last;
+    uint64_t host;        /* 0: none */
+    uint32_t token, last; /* number of the last request that was executed */
     uint64_t heard_ns;
-    int link;
+    int reply_link;                       /* the reply waits for room on this link; −1: it does not */
+    uint16_t reply_size;                  /* 0: nothing executed yet */
     uint8_t reply[LUMI_WIRE_PAYLOAD_MAX]; /* encoded */
-    uint16_t reply_size;
 };
 
 /* The board behind it. */
 struct lumi_wire_server_ops {
-    /* Executes one request; fills result, text, payload. */
+    /* Executes one request; fills result, text, payload (`reply` comes zeroed: result DONE). Not called for commands of
+     * later versions, malformed ones and numbers that are not finite: those are answered UNSUPPORTED and BAD. May call
+     * lumi_wire_server_event, nothing else of the server's. */
     void (*execute)(void *context, const lumi_wire_Request *request, lumi_wire_Reply *reply);
+    /* All but events_next and events_lost, which the server fills in, in the status of a reply too. */
     void (*status)(void *context, lumi_wire_Status *status);
     void (*emergency_stop)(void *context);
-    void (*heartbeat)(void *context); /* of a live session */
+    /* Of a live session that takes events: of a host in charge, not of an observer. */
+    void (*heartbeat)(void *context);
     /* Takes bytes for link `link`, all or none: false when it has no room now. */
     bool (*send)(void *context, int link, const uint8_t *frame, size_t size);
 };
@@ -42,13 +51,16 @@ struct lumi_wire_server_ops {
 struct lumi_wire_server {
     const struct lumi_wire_server_ops *ops;
     void *context;
-    lumi_wire_Welcome identity; /* board, unique_id, firmware, boot: filled by the owner */
+    lumi_wire_Welcome identity;
     struct lumi_wire_session sessions[LUMI_WIRE_SESSIONS];
     struct lumi_wire_deframer links[LUMI_WIRE_LINKS];
     struct lumi_wire_events events;
-    uint32_t tokens; /* given out so far; the next token mixes it with boot */
-    int event_link;  /* where events go: the link that last sent a heartbeat; −1: nobody has */
-    uint64_t events_sent_ns;
+    uint32_t tokens;           /* given out so far */
+    int event_link;            /* where events go; −1: nowhere */
+    uint32_t event_token;      /* of the session that takes them */
+    uint64_t event_heard_ns;   /* its last heartbeat */
+    uint64_t event_resend_ns;  /* when what is sent and not acknowledged goes again */
+    uint32_t repeated, unread; /* requests that came again; frames whose payload is no message */
     union {
         lumi_wire_HostFrame in;
         lumi_wire_BoardFrame out;
@@ -56,12 +68,18 @@ struct lumi_wire_server {
     uint8_t payload[LUMI_WIRE_PAYLOAD_MAX], frame[LUMI_WIRE_FRAME_MAX];
 };
 
+/* `identity`: board, unique_id, firmware, and boot, which must differ after every restart; version_min and version_max
+ * where they are not this program's (0). */
 void lumi_wire_server_init(struct lumi_wire_server *server, const struct lumi_wire_server_ops *ops, void *context,
                            const lumi_wire_Welcome *identity);
 void lumi_wire_server_receive(struct lumi_wire_server *server, int link, const uint8_t *data, size_t size,
                               uint64_t now_ns);
-/* Sends what events there are and the links take. */
+/* Sends what events and waiting replies there are and the links take. */
 void lumi_wire_server_poll(struct lumi_wire_server *server, uint64_t now_ns);
+/* When poll has something to do though nothing else happens: now_ns while something waits for room on a link;
+ * UINT64_MAX: never. */
+uint64_t lumi_wire_server_next_poll(const struct lumi_wire_server *server, uint64_t now_ns);
+/* Gives the event its number and keeps it; poll sends it. Texts are made printable. */
 void lumi_wire_server_event(struct lumi_wire_server *server, lumi_wire_Event *event);
 
 #ifdef __cplusplus

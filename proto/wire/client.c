@@ -1,0 +1,313 @@
+/* The host's end of the link. */
+#include "proto/wire/client.h"
+
+#include <assert.h>
+#include <string.h>
+
+void lumi_wire_client_init(struct lumi_wire_client *client, const struct lumi_wire_client_ops *ops, void *context,
+                           uint64_t host)
+{
+    assert(host != 0);
+    memset(client, 0, sizeof *client);
+    client->ops = ops;
+    client->context = context;
+    client->host = host;
+    client->version_min = LUMI_WIRE_VERSION_MIN;
+    client->version_max = LUMI_WIRE_VERSION_MAX;
+    client->hello_nonce = 1;
+    lumi_wire_deframer_init(&client->deframer);
+}
+
+/* ---- sending ---- */
+
+static bool send_payload(struct lumi_wire_client *client, const uint8_t *payload, size_t size)
+{
+    uint8_t frame[LUMI_WIRE_FRAME_MAX];
+
+    return client->ops->send(client->context, frame, lumi_wire_frame(payload, size, frame));
+}
+
+static bool send_message(struct lumi_wire_client *client, const lumi_wire_HostFrame *message)
+{
+    uint8_t payload[LUMI_WIRE_PAYLOAD_MAX];
+    size_t size = lumi_wire_encode_host(message, payload, sizeof payload);
+
+    return size > 0 && send_payload(client, payload, size);
+}
+
+static uint64_t due(bool sent, uint64_t now_ns, uint64_t again_ns)
+{
+    return now_ns + (sent ? again_ns : LUMI_WIRE_ROOM_NS);
+}
+
+static void send_hello(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    lumi_wire_HostFrame out = {.which_body = lumi_wire_HostFrame_hello_tag};
+
+    out.body.hello = (lumi_wire_Hello){.version_min = client->version_min,
+                                       .version_max = client->version_max,
+                                       .host = client->host,
+                                       .nonce = client->hello_nonce};
+    client->hello_due_ns = due(send_message(client, &out), now_ns, LUMI_WIRE_HELLO_NS);
+}
+
+static void send_request(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    bool sent = send_payload(client, client->request, client->request_size);
+
+    client->request_due_ns = due(sent, now_ns, LUMI_WIRE_RETRY_NS);
+}
+
+static void send_heartbeat(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    lumi_wire_HostFrame out = {.which_body = lumi_wire_HostFrame_heartbeat_tag};
+
+    out.body.heartbeat = (lumi_wire_Heartbeat){.token = client->welcome.token,
+                                               .host_time = now_ns,
+                                               .events_next = client->events_next,
+                                               .observer = client->observer};
+    bool sent = send_message(client, &out);
+    if (sent)
+        client->acknowledge = false;
+    client->heartbeat_due_ns = due(sent, now_ns, LUMI_WIRE_HEARTBEAT_NS);
+}
+
+static bool send_stop(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    lumi_wire_HostFrame out = {.which_body = lumi_wire_HostFrame_emergency_stop_tag};
+
+    out.body.emergency_stop.nonce = client->stop_nonce;
+    bool sent = send_message(client, &out);
+    if (sent)
+        client->stops_left--;
+    client->stop_due_ns = due(sent, now_ns, LUMI_WIRE_RETRY_NS);
+    return sent;
+}
+
+void lumi_wire_client_poll(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    if (client->stops_left > 0 && now_ns >= client->stop_due_ns)
+        send_stop(client, now_ns);
+    if (client->state == LUMI_WIRE_CLIENT_HELLO && now_ns >= client->hello_due_ns)
+        send_hello(client, now_ns);
+    if (client->state != LUMI_WIRE_CLIENT_OPEN)
+        return;
+    if (client->in_flight && now_ns >= client->request_due_ns) {
+        client->retries++;
+        send_request(client, now_ns);
+    }
+    if (now_ns >= client->heartbeat_due_ns)
+        send_heartbeat(client, now_ns);
+}
+
+static uint64_t earlier(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+uint64_t lumi_wire_client_next_poll(const struct lumi_wire_client *client)
+{
+    uint64_t next = UINT64_MAX;
+
+    if (client->stops_left > 0)
+        next = earlier(next, client->stop_due_ns);
+    if (client->state == LUMI_WIRE_CLIENT_HELLO)
+        next = earlier(next, client->hello_due_ns);
+    if (client->state == LUMI_WIRE_CLIENT_OPEN) {
+        next = earlier(next, client->heartbeat_due_ns);
+        if (client->in_flight)
+            next = earlier(next, client->request_due_ns);
+    }
+    return next;
+}
+
+bool lumi_wire_client_emergency_stop(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    client->stop_nonce++;
+    client->stops_left = LUMI_WIRE_STOPS;
+    return send_stop(client, now_ns);
+}
+
+int lumi_wire_client_request(struct lumi_wire_client *client, lumi_wire_Request *request, uint64_t now_ns,
+                             struct lumi_error *error)
+{
+    lumi_wire_HostFrame out = {.which_body = lumi_wire_HostFrame_request_tag};
+
+    LUMI_TRY(lumi_wire_client_version(client, error));
+    if (client->state != LUMI_WIRE_CLIENT_OPEN)
+        return lumi_fail(error, LUMI_ERR_BUSY, "the rig's board has not answered yet");
+    if (client->in_flight)
+        return lumi_fail(error, LUMI_ERR_BUSY, "the rig's board has not answered the last command yet");
+    request->token = client->welcome.token;
+    request->number = client->number + 1;
+    out.body.request = *request;
+    client->request_size = lumi_wire_encode_host(&out, client->request, sizeof client->request);
+    if (client->request_size == 0)
+        return lumi_fail(error, LUMI_ERR_ARG, "a command that cannot be encoded");
+    client->number++;
+    client->in_flight = true;
+    send_request(client, now_ns);
+    return LUMI_OK;
+}
+
+/* ---- receiving ---- */
+
+/* Asks for the session anew: a Welcome to an earlier Hello no longer counts. */
+static void say_hello(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    client->state = LUMI_WIRE_CLIENT_HELLO;
+    client->hello_nonce++;
+    send_hello(client, now_ns);
+}
+
+void lumi_wire_client_reconnected(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    uint32_t frames = client->deframer.frames, errors = client->deframer.errors;
+
+    lumi_wire_deframer_init(&client->deframer);
+    client->deframer.frames = frames;
+    client->deframer.errors = errors;
+    say_hello(client, now_ns);
+}
+
+/* A request in flight goes on in its own session, if that has executed it or comes to it next. */
+static bool goes_on(const struct lumi_wire_client *client, const lumi_wire_Welcome *welcome)
+{
+    return welcome->token == client->welcome.token &&
+           (welcome->last_request == client->number || welcome->last_request == client->number - 1);
+}
+
+static void on_welcome(struct lumi_wire_client *client, const lumi_wire_Welcome *welcome, uint64_t now_ns)
+{
+    if (client->state != LUMI_WIRE_CLIENT_HELLO || welcome->host != client->host ||
+        welcome->nonce != client->hello_nonce)
+        return;
+    if (welcome->version < client->version_min || welcome->version > client->version_max || welcome->version == 0) {
+        client->welcome = *welcome;
+        client->state = LUMI_WIRE_CLIENT_VERSION;
+        if (client->in_flight) {
+            client->in_flight = false;
+            client->ops->request_lost(client->context, client->number);
+        }
+        return;
+    }
+    bool restarted = client->welcomed && welcome->boot != client->welcome.boot;
+    bool lost = client->in_flight && !goes_on(client, welcome);
+    uint32_t number = client->number;
+
+    if (restarted)
+        client->events_next = 0;
+    else if (!client->welcomed)
+        client->events_next = welcome->events_first;
+    if (lost)
+        client->in_flight = false;
+    if (!client->in_flight)
+        client->number = welcome->last_request;
+    client->welcome = *welcome;
+    client->welcomed = true;
+    client->state = LUMI_WIRE_CLIENT_OPEN;
+    if (client->in_flight)
+        send_request(client, now_ns);
+    send_heartbeat(client, now_ns);
+    client->ops->welcome(client->context, &client->welcome, restarted);
+    if (lost)
+        client->ops->request_lost(client->context, number);
+}
+
+static void on_reply(struct lumi_wire_client *client, const lumi_wire_Reply *reply, uint64_t now_ns)
+{
+    bool ours = client->welcomed && reply->token == client->welcome.token;
+
+    if (reply->token == 0) {
+        if (reply->number == client->stop_nonce)
+            client->stops_left = 0;
+    } else if (ours && reply->result == lumi_wire_Result_NO_SESSION) {
+        if (client->state == LUMI_WIRE_CLIENT_OPEN)
+            say_hello(client, now_ns);
+    } else if (!ours || !client->in_flight || reply->number != client->number) {
+        client->duplicates++;
+    } else if (reply->result == lumi_wire_Result_OUT_OF_ORDER) {
+        if (client->state == LUMI_WIRE_CLIENT_OPEN)
+            say_hello(client, now_ns);
+    } else {
+        client->in_flight = false;
+        client->ops->reply(client->context, reply);
+    }
+}
+
+static void on_event(struct lumi_wire_client *client, const lumi_wire_Event *event, uint64_t now_ns)
+{
+    int32_t kept = (int32_t)(event->number - event->oldest);
+
+    if (client->observer || client->state != LUMI_WIRE_CLIENT_OPEN || event->boot != client->welcome.boot || kept < 0)
+        return;
+    if (!client->acknowledge) {
+        client->acknowledge = true;
+        client->heartbeat_due_ns = earlier(client->heartbeat_due_ns, now_ns + LUMI_WIRE_ACKNOWLEDGE_NS);
+    }
+    int32_t missing = (int32_t)(event->oldest - client->events_next);
+    if (missing > 0) {
+        client->events_next = event->oldest;
+        client->ops->events_lost(client->context, (uint32_t)missing);
+    }
+    int32_t ahead = (int32_t)(event->number - client->events_next);
+    if (ahead < 0) {
+        client->duplicates++;
+    } else if (ahead > 0) {
+        client->gaps++;
+    } else {
+        client->events_next++;
+        client->ops->event(client->context, event);
+    }
+}
+
+static void on_pulse(struct lumi_wire_client *client, const lumi_wire_Pulse *pulse, uint64_t now_ns)
+{
+    if (client->state != LUMI_WIRE_CLIENT_OPEN || pulse->token != client->welcome.token)
+        return;
+    if (pulse->host_time > now_ns || (client->pulsed && pulse->host_time <= client->pulse_time)) {
+        client->duplicates++;
+        return;
+    }
+    client->pulsed = true;
+    client->pulse_time = pulse->host_time;
+    client->ops->pulse(client->context, pulse, now_ns);
+}
+
+void lumi_wire_client_receive(struct lumi_wire_client *client, const uint8_t *data, size_t size, uint64_t now_ns)
+{
+    lumi_wire_BoardFrame in;
+
+    for (size_t i = 0; i < size; i++) {
+        if (!lumi_wire_deframe(&client->deframer, data[i]))
+            continue;
+        if (!lumi_wire_decode_board(client->deframer.data, client->deframer.size, &in) || in.which_body == 0) {
+            client->unread++;
+            continue;
+        }
+        client->heard_ns = now_ns;
+        if (in.which_body == lumi_wire_BoardFrame_welcome_tag)
+            on_welcome(client, &in.body.welcome, now_ns);
+        else if (in.which_body == lumi_wire_BoardFrame_reply_tag)
+            on_reply(client, &in.body.reply, now_ns);
+        else if (in.which_body == lumi_wire_BoardFrame_pulse_tag)
+            on_pulse(client, &in.body.pulse, now_ns);
+        else
+            on_event(client, &in.body.event, now_ns);
+    }
+}
+
+int lumi_wire_client_version(const struct lumi_wire_client *client, struct lumi_error *error)
+{
+    const lumi_wire_Welcome *board = &client->welcome;
+
+    if (client->state != LUMI_WIRE_CLIENT_VERSION)
+        return LUMI_OK;
+    return lumi_fail(error, LUMI_ERR_VERSION,
+                     "the board (%s, firmware %s) speaks versions %u to %u of the rig's messages, this program %u to "
+                     "%u: %s",
+                     board->board, board->firmware, (unsigned)board->version_min, (unsigned)board->version_max,
+                     (unsigned)client->version_min, (unsigned)client->version_max,
+                     board->version_max < client->version_min ? "flash the board anew (lumi rig flash)"
+                                                              : "update this program");
+}

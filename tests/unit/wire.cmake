@@ -1,0 +1,2 @@
+lumi_test(test_wire_frame FOLDERS wire)
+lumi_test(test_wire_session FOLDERS wire)
