@@ -307,7 +307,7 @@ static void fail_all(struct lumi_rig_link *link, int code, const char *text)
 
 static void start_request(struct lumi_rig_link *link)
 {
-    if (link->stop_wanted && link->open && lumi_wire_client_emergency_stop(&link->client))
+    if (link->stop_wanted && link->open && lumi_wire_client_emergency_stop(&link->client, link->now_ns))
         link->stop_wanted = false;
     if (link->snapshot.state == LUMI_RIG_LINK_VERSION)
         fail_all(link, LUMI_ERR_VERSION, link->snapshot.text);
