@@ -48,7 +48,7 @@ static bool read_slot(const struct board *board, int slot, uint8_t header[HEADER
     return checksum(header, data ? data : flash + HEADER, size) == WORD_OF(header, CHECKSUM_WORD);
 }
 
-/* The slot with the newest whole copy, below `before` if that is not 0; −1: none. */
+/* The slot with the newest whole copy, and its header; −1: none. */
 static int newest(const struct board *board, uint8_t header[HEADER])
 {
     uint8_t found[HEADER];
@@ -122,6 +122,9 @@ int profile_store_save(const struct board *board, const uint8_t *data, size_t si
                              (unsigned)WORD_OF(header, FORMAT_WORD));
         sequence = WORD_OF(header, SEQUENCE_WORD) + 1;
         slot = (used + 1) % BOARD_PROFILE_SLOTS;
+        /* If the power went while its first word was written, that word may hold by luck. Writing the same bits once
+         * more makes it firm, before the only other copy is erased. */
+        board->flash_write(board->port, used, 0, header, 4);
     }
     memset(header, 0xff, sizeof header);
     set_word(header, MAGIC_WORD, MAGIC);

@@ -195,8 +195,8 @@ static bool port_flash_write(void *port, int slot, uint32_t offset, const void *
     done = before_cut(board, size);
     for (size_t i = 0; i < done; i++) {
         uint8_t *cell = &board->flash[slot][offset + i];
-        board->counts.flash_faults += *cell != 0xff;
-        *cell &= bytes[i]; /* programming only takes bits from 1 to 0 */
+        board->counts.flash_faults += (*cell & bytes[i]) != bytes[i]; /* the same bits once more are no fault */
+        *cell &= bytes[i];                                            /* programming only takes bits from 1 to 0 */
     }
     if (done < size)
         board->flash[slot][offset + done] &= bytes[done] | 0x55; /* half of the bits made it */

@@ -1,0 +1,1 @@
+lumi_test(test_sweep_plan FOLDERS mechanism base)
