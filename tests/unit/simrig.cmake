@@ -1,1 +1,2 @@
 lumi_test(test_host_board FOLDERS firmware_host base)
+lumi_test(test_mechanics FOLDERS sim_rig mechanism base)
