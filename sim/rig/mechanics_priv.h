@@ -24,6 +24,7 @@ struct sim_platform {
     bool energised;
     double rate;        /* full steps/s, from the last two pulses */
     uint64_t last_step; /* when */
+    uint64_t still_at;  /* with no pulse until then the field no longer turns */
     bool last_forward;
     struct sim_oscillator body, sway; /* about the seat, in microsteps */
     struct sim_oscillator arm;        /* about `rest`, in rad */

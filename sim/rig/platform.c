@@ -17,6 +17,8 @@
 
 #define FINE_DT 1e-4       /* s, of the integration far from rest */
 #define LINEAR_LAG 0.35    /* full steps up to which sin is taken as straight */
+#define SLOWEST 0.1        /* s between two pulses: beyond it the field jumps rather than turns */
+#define DAMPING_MOST 0.2   /* share of the torque that damping can make: it is the same current */
 #define HOLD_GRACE 0.020   /* s without brake and current until the arm's inertia gives in */
 #define FALL_GRAVITY 12.0  /* rad/s², of an arm that nothing holds */
 #define FALL_END 3.0       /* rad, where it hits the tripod */
@@ -86,6 +88,21 @@ static void pay_out(struct sim_mechanics *m, double place)
     }
 }
 
+/* Microsteps/s. */
+static double field_speed(const struct sim_mechanics *m)
+{
+    return (m->platform.last_forward ? 1 : -1) * m->platform.rate * full_step(m);
+}
+
+/* Carried along by the field, so that its torque is a spring. */
+static bool near_rest(const struct sim_mechanics *m)
+{
+    const struct sim_platform *p = &m->platform;
+
+    return fabs(p->body.y) <= LINEAR_LAG * full_step(m) &&
+           fabs(p->body.v - field_speed(m)) <= 2 * LINEAR_LAG * full_step(m) * p->omega;
+}
+
 /* The seat follows the field through the play; the load's modes are pulled along. */
 static void seat_follows(struct sim_mechanics *m)
 {
@@ -95,7 +112,7 @@ static void seat_follows(struct sim_mechanics *m)
     if (by == 0)
         return;
     p->seat = seat;
-    sim_oscillator_jump(&p->body, by, p->omega, m->options.damping);
+    sim_oscillator_jump(&p->body, by, p->omega, near_rest(m) ? m->options.damping : 0);
     sim_oscillator_jump(&p->sway, by, p->omega_sway, m->options.sway_damping);
     pay_out(m, seat);
 }
@@ -106,7 +123,8 @@ void sim_platform_step(struct sim_mechanics *m, bool forward)
     double dt = SECONDS(m->now - p->last_step);
     double top = m->options.rest_turns * p->steps_per_turn;
 
-    p->rate = forward == p->last_forward && dt > 0 ? 1 / (dt * full_step(m)) : 0;
+    p->rate = forward == p->last_forward && dt > 0 && dt < SLOWEST ? 1 / (dt * full_step(m)) : 0;
+    p->still_at = m->now + 2 * (m->now - p->last_step);
     p->last_step = m->now;
     p->last_forward = forward;
     p->count += forward ? 1 : -1;
@@ -122,7 +140,10 @@ void sim_platform_step(struct sim_mechanics *m, bool forward)
         p->field -= (forward ? 4 : -4) * full_step(m);
     }
     if (!forward && !m->truth.string.held && p->field < top - p->lag_limit) {
-        p->field += 4 * full_step(m); /* the arm lies on its rest and the string is tight: the motor stalls */
+        /* The arm lies on its rest and the string is tight: the rotor jumps back into the place it came from. */
+        p->field += 4 * full_step(m);
+        p->seat = p->field;
+        p->body = (struct sim_oscillator){0, 0};
         p->missed += 4;
     }
     seat_follows(m);
@@ -138,13 +159,15 @@ static double torque_left(const struct sim_mechanics *m)
 static void integrate(struct sim_mechanics *m, double dt)
 {
     struct sim_platform *p = &m->platform;
-    double fs = full_step(m), left = torque_left(m);
+    double fs = full_step(m), left = torque_left(m), stiffness = p->omega * p->omega;
+    double speed = field_speed(m);
+    double limit = DAMPING_MOST * stiffness * left * (2 / LUMI_PI) * fs;
 
     while (dt > 0) {
         double h = fmin(dt, FINE_DT), lag = p->body.y / fs;
         double pull = sin(LUMI_PI / 2 * lag) * (2 / LUMI_PI) * fs;
-        double a = -p->omega * p->omega * left * pull - 2 * m->options.damping * p->omega * p->body.v;
-        p->body.v += a * h;
+        double damping = -2 * m->options.damping * p->omega * (p->body.v - speed);
+        p->body.v += (-stiffness * left * pull + fmin(fmax(damping, -limit), limit)) * h;
         p->body.y += p->body.v * h;
         dt -= h;
         if (fabs(p->body.y) > p->lag_limit) {
@@ -245,7 +268,7 @@ static void propagate(struct sim_mechanics *m, double dt)
 
     if (!p->energised)
         coast(m, dt);
-    else if (fabs(p->body.y) > LINEAR_LAG * full_step(m))
+    else if (!near_rest(m))
         integrate(m, dt);
     else
         sim_oscillator_advance(&p->body, dt, p->omega * sqrt(torque_left(m)), m->options.damping);
@@ -262,7 +285,7 @@ void sim_platform_advance(struct sim_mechanics *m, uint64_t to)
 
     if (dt > 0)
         propagate(m, dt);
-    if (to - p->last_step > BOARD_TICK_HZ / 10)
+    if (p->rate > 0 && to >= p->still_at)
         p->rate = 0;
     m->now = to;
     if (p->brake_wanted && !p->brake_holds && m->truth.control.safety.brake_fitted && to >= p->brake_at) {
@@ -277,11 +300,11 @@ void sim_platform_advance(struct sim_mechanics *m, uint64_t to)
 uint64_t sim_platform_next(const struct sim_mechanics *m)
 {
     const struct sim_platform *p = &m->platform;
-    uint64_t next = BOARD_NEVER;
+    uint64_t next = p->rate > 0 ? p->still_at : BOARD_NEVER;
     double reach = fabs(p->body.y) + fabs(p->body.v) / p->omega;
 
     if (p->brake_wanted && !p->brake_holds && m->truth.control.safety.brake_fitted)
-        next = p->brake_at > m->now ? p->brake_at : m->now + 1;
+        next = MIN(next, MAX(p->brake_at, m->now + 1));
     if (p->loose_since != BOARD_NEVER && p->fallen < FALL_END)
         next = MIN(next, m->now + BOARD_TICK_HZ / 1000);
     if (p->energised ? reach > 1e-3 && reach > sim_switches_distance(m) : p->body.v != 0)
