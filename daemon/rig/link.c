@@ -96,6 +96,7 @@ int lumi_rig_link_open_stream(struct lumi_rig_stream *stream, const struct lumi_
     link->snapshot.code = LUMI_ERR_NOTFOUND;
     lumi_wire_client_init(&link->client, &lumi_rig_link_client_ops, link,
                           link->options.host ? link->options.host : random_host());
+    link->client.observer = link->options.observer;
     LUMI_GOTO(code, fail, make_pipe(link, error));
     if (start_thread(link)) {
         code = lumi_fail(error, LUMI_ERR_IO, "%s: no thread could be started", stream->name);
@@ -246,7 +247,7 @@ bool lumi_rig_link_emergency_stop(struct lumi_rig_link *link)
 
     pthread_mutex_lock(&link->mutex);
     sent = link->snapshot.state != LUMI_RIG_LINK_CLOSED;
-    link->stop_wanted = true;
+    link->stop_wanted = link->snapshot.stop_pending = true;
     lumi_rig_link_wake(link);
     pthread_mutex_unlock(&link->mutex);
     return sent;

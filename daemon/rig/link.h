@@ -26,6 +26,7 @@ enum lumi_rig_link_state {
 
 struct lumi_rig_link_options {
     uint64_t host;   /* the client's number, not 0; 0 takes a random one */
+    bool observer;   /* takes no events from whoever is in charge, and keeps no sweep alive */
     double patience; /* s without a word from the board before a session counts as silent (2) */
     /* Called in the link's thread when notices have come, for a main loop that wants waking; must not call the link. */
     void (*wake)(void *context);
@@ -57,7 +58,8 @@ int lumi_rig_link_request(struct lumi_rig_link *link, const lumi_wire_Request *r
  * what cannot be, LUMI_ERR_UNSUPPORTED, LUMI_ERR_IO; with the board's own words. `reply` may be NULL. */
 int lumi_rig_link_command(struct lumi_rig_link *link, const lumi_wire_Request *request, double seconds,
                           lumi_wire_Reply *reply, struct lumi_error *error);
-/* At once, without waiting for anything before it. False: no stream is open. */
+/* At once, without waiting for anything before it, and again until the board confirms it (snapshot: stop_pending).
+ * False: no stream is open; it goes out when one is. */
 bool lumi_rig_link_emergency_stop(struct lumi_rig_link *link);
 
 enum lumi_rig_notice_kind {
@@ -84,6 +86,7 @@ struct lumi_rig_link_snapshot {
     char text[1024];
     char name[LUMI_RIG_STREAM_NAME]; /* of the stream */
     lumi_wire_Welcome welcome;       /* of the last session */
+    bool stop_pending;               /* an emergency stop that the board has not confirmed */
     bool status_known;
     lumi_wire_Status status; /* of the last heartbeat */
     uint64_t status_ns;      /* CLOCK_MONOTONIC when it came; of the board's clock: */

@@ -47,7 +47,6 @@ struct lumi_rig_link {
     struct lumi_rig_stream *stream;
     bool open, opened_before;
     uint64_t now_ns, opened_ns, try_ns;
-    uint64_t heard_ns;    /* the last good frame */
     uint64_t answered_ns; /* when there last was a session */
     uint64_t received;    /* bytes since it was opened */
     uint32_t frames;      /* of the client's deframer, when heard_ns was set */

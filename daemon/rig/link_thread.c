@@ -204,7 +204,7 @@ static void try_open(struct lumi_rig_link *link)
     }
     snprintf(link->snapshot.name, sizeof link->snapshot.name, "%s", link->stream->name);
     link->open = true;
-    link->opened_ns = link->heard_ns = link->answered_ns = link->now_ns;
+    link->opened_ns = link->answered_ns = link->now_ns;
     link->received = 0;
     if (link->opened_before) {
         link->snapshot.reconnections++;
@@ -217,8 +217,10 @@ static void try_open(struct lumi_rig_link *link)
 static void judge(struct lumi_rig_link *link)
 {
     const struct lumi_wire_client *client = &link->client;
-    double quiet = (double)(link->now_ns - link->heard_ns) * 1e-9;
+    uint64_t heard_ns = client->heard_ns > link->opened_ns ? client->heard_ns : link->opened_ns;
+    double quiet = (double)(link->now_ns - heard_ns) * 1e-9;
     double unanswered;
+    struct lumi_error error;
     char text[1024];
 
     if (!link->open)
@@ -226,21 +228,17 @@ static void judge(struct lumi_rig_link *link)
     if (client->state != LUMI_WIRE_CLIENT_HELLO)
         link->answered_ns = link->now_ns;
     unanswered = (double)(link->now_ns - link->answered_ns) * 1e-9;
-    if (client->state == LUMI_WIRE_CLIENT_VERSION) {
-        snprintf(text, sizeof text,
-                 "%s: the board (firmware %s) speaks versions %u to %u of the protocol, this program %d to %d: %s",
-                 link->stream->name, client->welcome.firmware, client->welcome.version_min, client->welcome.version_max,
-                 LUMI_WIRE_VERSION_MIN, LUMI_WIRE_VERSION_MAX,
-                 client->welcome.version_min > LUMI_WIRE_VERSION_MAX ? "this program is too old for it"
-                                                                     : "its firmware is too old");
-        set_state(link, LUMI_RIG_LINK_VERSION, LUMI_ERR_VERSION, text);
+    if (lumi_wire_client_version(client, &error)) {
+        lumi_fail_prefix(&error, "%s", link->stream->name);
+        link->snapshot.welcome = client->welcome;
+        set_state(link, LUMI_RIG_LINK_VERSION, LUMI_ERR_VERSION, error.text);
     } else if (client->state == LUMI_WIRE_CLIENT_OPEN && quiet < link->options.patience) {
         set_state(link, LUMI_RIG_LINK_OPEN, LUMI_OK, "");
     } else if (client->state == LUMI_WIRE_CLIENT_OPEN) {
         snprintf(text, sizeof text, "%s: the board has been silent for %.1f s", link->stream->name, quiet);
         set_state(link, LUMI_RIG_LINK_SILENT, LUMI_ERR_IO, text);
     } else if (link->answered_ns == link->opened_ns &&
-               ((link->received >= FOREIGN_BYTES && link->heard_ns == link->opened_ns) ||
+               ((link->received >= FOREIGN_BYTES && heard_ns == link->opened_ns) ||
                 (link->received && unanswered >= link->options.patience))) {
         snprintf(
             text, sizeof text,
@@ -269,9 +267,6 @@ static void receive(struct lumi_rig_link *link)
             return;
         link->received += (uint64_t)count;
         lumi_wire_client_receive(&link->client, data, (size_t)count, link->now_ns);
-        if (link->client.deframer.frames != link->frames)
-            link->heard_ns = link->now_ns;
-        link->frames = link->client.deframer.frames;
         if (count < (long)sizeof data)
             return;
     }
@@ -307,8 +302,11 @@ static void fail_all(struct lumi_rig_link *link, int code, const char *text)
 
 static void start_request(struct lumi_rig_link *link)
 {
-    if (link->stop_wanted && link->open && lumi_wire_client_emergency_stop(&link->client, link->now_ns))
-        link->stop_wanted = false;
+    if (link->stop_wanted) {
+        link->stop_wanted = false; /* the client repeats it until the board confirms it */
+        lumi_wire_client_emergency_stop(&link->client, link->now_ns);
+    }
+    link->snapshot.stop_pending = link->client.stops_left > 0;
     if (link->snapshot.state == LUMI_RIG_LINK_VERSION)
         fail_all(link, LUMI_ERR_VERSION, link->snapshot.text);
     while (link->queue && !link->in_flight) {
