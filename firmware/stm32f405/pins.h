@@ -43,8 +43,6 @@
 #define PIN_C_DRIVER_FAULT 10 /* EXTI10 */
 #define PIN_C_REACHED 11      /* EXTI11; LOW: active */
 
-#define SERIAL_BAUD 115200u /* 8 data bits, no parity, one stop bit */
-
 /* Supply: 100 kΩ to the rig's supply, 10 kΩ to ground, 100 nF across these; 4095 is 3.3 V at the pin. */
 #define SUPPLY_DIVIDER 11
 #define SUPPLY_REFERENCE_MV 3300
@@ -65,13 +63,5 @@
 #define FLASH_PROFILE_SECTOR0 5
 #define FLASH_PROFILE_ADDRESS0 0x08020000u
 #define FLASH_PROFILE_STRIDE 0x00020000u
-
-/* USB: pid.codes 0x1209 with 0x0001, the product number reserved for tests; a maker of boards takes a number of his
- * own (https://pid.codes). Interface 0 is vendor-specific. */
-#define USB_VENDOR 0x1209
-#define USB_PRODUCT 0x0001
-#define USB_EP_OUT 0x01
-#define USB_EP_IN 0x81
-#define USB_BULK_SIZE 64
 
 #endif
