@@ -7,8 +7,7 @@
 
 #include <string.h>
 
-#define ERRORS                                                                                                         \
-    (FLASH_SR_OPERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_PGPERR | FLASH_SR_PGSERR)
+#define ERRORS (FLASH_SR_OPERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_PGPERR | FLASH_SR_PGSERR)
 #define ERASE_TICKS (4u * BOARD_TICK_HZ)
 #define WRITE_TICKS (BOARD_TICK_HZ / 1000u) /* a word takes 100 µs at most */
 
@@ -66,8 +65,9 @@ bool flash_erase_slot(int slot)
     if (slot < 0 || slot >= BOARD_PROFILE_SLOTS)
         return false;
     unlock();
-    const uint32_t status = operate(
-        FLASH_CR_PSIZE_32 | FLASH_CR_SER | FLASH_CR_SNB((uint32_t)(FLASH_PROFILE_SECTOR0 + slot)), NULL, 0, ERASE_TICKS);
+    const uint32_t status =
+        operate(FLASH_CR_PSIZE_32 | FLASH_CR_SER | FLASH_CR_SNB((uint32_t)(FLASH_PROFILE_SECTOR0 + slot)), NULL, 0,
+                ERASE_TICKS);
     forget_cached();
     return !(status & (ERRORS | FLASH_SR_BSY));
 }

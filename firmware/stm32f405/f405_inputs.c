@@ -17,8 +17,8 @@ static struct {
 
 void inputs_init(void)
 {
-    SYSCFG_EXTICR(0) = SYSCFG_EXTICR_PC * 0x1111u; /* EXTI0 … 3 */
-    SYSCFG_EXTICR(1) = SYSCFG_EXTICR_PC;           /* EXTI4 */
+    SYSCFG_EXTICR(0) = SYSCFG_EXTICR_PC * 0x1111u;                     /* EXTI0 … 3 */
+    SYSCFG_EXTICR(1) = SYSCFG_EXTICR_PC;                               /* EXTI4 */
     SYSCFG_EXTICR(2) = SYSCFG_EXTICR_PC << 8 | SYSCFG_EXTICR_PC << 12; /* EXTI10, 11 */
     EXTI_RTSR = LINES;
     EXTI_FTSR = LINES;

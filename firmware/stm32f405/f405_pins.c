@@ -14,8 +14,8 @@
 void pins_init(void)
 {
     /* Levels first, then directions: motor energised and brake closed as they were in reset. */
-    GPIO_BSRR(GPIOA_BASE) = RESET(PIN_A_RS485) | RESET(PIN_A_DIR) | RESET(PIN_A_ENABLE) | RESET(PIN_A_BRAKE) |
-                            RESET(PIN_A_LAMP);
+    GPIO_BSRR(GPIOA_BASE) =
+        RESET(PIN_A_RS485) | RESET(PIN_A_DIR) | RESET(PIN_A_ENABLE) | RESET(PIN_A_BRAKE) | RESET(PIN_A_LAMP);
     GPIO_BSRR(GPIOB_BASE) = 0xffff0000u;
     GPIO_BSRR(GPIOC_BASE) = RESET(PIN_C_STATUS);
 
@@ -69,9 +69,9 @@ void pin_output(enum board_output output, bool active)
 bool pin_input(enum board_input input)
 {
     static const uint8_t pins[BOARD_INPUTS] = {
-        [BOARD_IN_ESTOP] = PIN_C_ESTOP,   [BOARD_IN_INDEX] = PIN_C_INDEX,
-        [BOARD_IN_SLACK] = PIN_C_SLACK,   [BOARD_IN_STRING_END] = PIN_C_STRING_END,
-        [BOARD_IN_WOUND] = PIN_C_WOUND,   [BOARD_IN_DRIVER_FAULT] = PIN_C_DRIVER_FAULT,
+        [BOARD_IN_ESTOP] = PIN_C_ESTOP,    [BOARD_IN_INDEX] = PIN_C_INDEX,
+        [BOARD_IN_SLACK] = PIN_C_SLACK,    [BOARD_IN_STRING_END] = PIN_C_STRING_END,
+        [BOARD_IN_WOUND] = PIN_C_WOUND,    [BOARD_IN_DRIVER_FAULT] = PIN_C_DRIVER_FAULT,
         [BOARD_IN_REACHED] = PIN_C_REACHED};
     const bool high = GPIO_IDR(GPIOC_BASE) >> pins[input] & 1;
 
