@@ -1,6 +1,6 @@
-/* Fills size and checksum into the header of a firmware image (firmware/board/image.h).
+/* Fills size and checksum into the header of a firmware image (firmware/board/board_image.h).
  * usage: image_seal IN OUT */
-#include "firmware/board/image.h"
+#include "firmware/board/board_image.h"
 #include "proto/base/bytes.h"
 
 #include <stdio.h>

@@ -9,8 +9,8 @@
  *   24  16 board, zero-padded ("stm32f405")
  *   40  24 firmware version, zero-padded
  */
-#ifndef LUMI_FIRMWARE_BOARD_IMAGE_H
-#define LUMI_FIRMWARE_BOARD_IMAGE_H
+#ifndef LUMI_FIRMWARE_BOARD_BOARD_IMAGE_H
+#define LUMI_FIRMWARE_BOARD_BOARD_IMAGE_H
 
 #include <stdint.h>
 
