@@ -78,7 +78,12 @@ bool text_read_integer(const char *text, int *value)
 
 bool text_print_real(double value, double unit, char text[TEXT_NUMBER])
 {
-    for (int digits = 1; digits <= 17; digits++) {
+    int digits = 1;
+
+    /* Not "1.8e+02": a number of ordinary size shows all the places before its point. */
+    for (double size = fabs(value / unit); size >= 10 && size < 1e9 && digits < 9; size /= 10)
+        digits++;
+    for (; digits <= 17; digits++) {
         double back;
         snprintf(text, TEXT_NUMBER, "%.*g", digits, value / unit);
         for (char *c = text; *c; c++)

@@ -1,1 +1,2 @@
 lumi_test(test_sweep_plan FOLDERS mechanism base)
+lumi_test(test_rig_control FOLDERS mechanism base)

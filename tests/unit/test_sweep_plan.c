@@ -198,9 +198,6 @@ static void a_plan_that_outruns_motor_board_or_cameras_is_refused(void **state)
     can(&plan, &rig);
     rig.microsteps = 256;
     rig.gear_motor = 15;
-    rig.control.motion.step_pulse = 1e-6;
-    rig.control.motion.speed_max = rig.control.motion.wind_speed = 0.7;
-    assert_int_equal(lumi_rig_check(&rig, NULL), LUMI_OK);
     plan.turn_time = 7.6;
     cannot(&plan, &rig, "steps/s, the board makes 100000");
     rig = builtin("bar2");
