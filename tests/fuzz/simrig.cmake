@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_fault_script FOLDERS sim_rig)
