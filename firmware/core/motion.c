@@ -103,6 +103,17 @@ static double bend(const struct ramp_phase *at, double n)
     return BOARD_TICK_HZ * w * fabs(3 * aw * aw - jw) * (0.0481125 / 6);
 }
 
+/* The most it bends between two places of the curve: at its ends, and where a phase begins in between. */
+static double most_bend(const struct ramp *ramp, const struct ramp_phase *from, const struct ramp_phase *to, double n)
+{
+    double most = fmax(bend(from, n), bend(to, n));
+
+    for (int i = 1; i < ramp->count; i++)
+        if (ramp->phases[i].t > from->t && ramp->phases[i].t < to->t)
+            most = fmax(most, bend(&ramp->phases[i], n));
+    return most;
+}
+
 static double time_of_pulse(const struct motion *motion, int64_t pulse, double guess)
 {
     return ramp_time(&motion->ramp, (double)pulse + 0.5, guess);
@@ -130,6 +141,7 @@ static void put_segment(struct motion *motion, uint32_t n, const struct ramp_pha
     motion->at_last.v = end->v;
     motion->last += n;
     motion->stride = n;
+    motion->safe_until = motion->origin + motion->at_last.ticks - ((s->interval + (uint64_t)s->add * (n - 1)) >> 32);
     atomic_store_explicit(&motion->head, head + 1, memory_order_release);
 }
 
@@ -152,16 +164,11 @@ static void plan_segment(struct motion *motion)
         double guess = t + n / v;
         double at = time_of_pulse(motion, motion->last + (int64_t)n, guess);
         ramp_at(&motion->ramp, at, &end);
-        if (n <= shortest || (bend(&end, n) <= limit && bend(&here, n) <= limit))
+        if (n <= shortest || most_bend(&motion->ramp, &here, &end, n) <= limit)
             break;
         n = fmax(floor(n / 2), shortest);
     }
     put_segment(motion, (uint32_t)n, &end);
-}
-
-static uint64_t tick_of_last(const struct motion *motion)
-{
-    return motion->origin + motion->at_last.ticks;
 }
 
 void motion_poll(struct motion *motion)
@@ -174,11 +181,11 @@ void motion_poll(struct motion *motion)
         return;
     }
     while (motion->last < motion->pulses - 1 && motion->head - motion->tail < MOTION_SEGMENTS &&
-           tick_of_last(motion) < now + HORIZON)
+           motion->safe_until < now + HORIZON)
         plan_segment(motion);
     if (motion->last == motion->pulses - 1)
         motion->planned = true;
-    uint64_t until = tick_of_last(motion);
+    uint64_t until = motion->safe_until;
     motion->next_poll = motion->planned ? BOARD_NEVER : until > now ? now + (until - now) / 2 : now;
 }
 

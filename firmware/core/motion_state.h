@@ -40,8 +40,9 @@ struct motion {
     uint64_t origin;   /* tick of the curve's begin */
     uint64_t rest_at;  /* tick of its end */
     uint64_t next_poll;
-    int64_t pulses; /* of the move */
-    int64_t last;   /* number of the last pulse that is in the queue, from 0 */
+    uint64_t safe_until; /* tick of the last pulse but one in the queue: there, more must be in it */
+    int64_t pulses;      /* of the move */
+    int64_t last;        /* number of the last pulse that is in the queue, from 0 */
     struct {
         double t, v;       /* when it comes by the curve, s; the speed there */
         uint64_t ticks;    /* when it comes, from the origin … */

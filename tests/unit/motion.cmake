@@ -1,2 +1,2 @@
-lumi_test(test_motion FOLDERS firmware_core)
+lumi_test(test_motion FOLDERS firmware_core mechanism)
 lumi_test(test_homing FOLDERS firmware_core mechanism)
