@@ -52,7 +52,8 @@ struct lumi_drive_map {
     struct lumi_drive_command start, stop, reset, home;
 };
 
-/* LUMI_ERR_FORMAT names `source` and the line. Wants status, target, start, and the bits enabled, reached and fault. */
+/* LUMI_ERR_FORMAT names `source` and the line. Wants status (with the bits enabled, reached and fault), position,
+ * target and start. */
 int lumi_drive_map_parse(const char *text, size_t size, const char *source, struct lumi_drive_map *map,
                          struct lumi_error *error);
 

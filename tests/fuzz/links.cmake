@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_drive_map FOLDERS daemon_rig base)
