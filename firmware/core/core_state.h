@@ -58,6 +58,8 @@ struct core {
 void core_state_event(struct core *core, enum state_event event);
 /* At rest, what was going on is over: known or lost, with a fault or without. */
 void core_rest(struct core *core);
+/* What is going on ends as soon as it may; shots that have begun are finished, or what is left of them is over. */
+void core_stop_soon(struct core *core, bool finish);
 /* Loads what flash has; the state follows. */
 void core_load_profile(struct core *core);
 /* Starts a move: within the profile's limits at most, and not past an emergency stop. */

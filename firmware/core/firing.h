@@ -65,6 +65,9 @@ uint64_t firing_spacing(const struct firing *firing, int from, int to, uint64_t 
 /* Nothing more is fired: what has begun is finished (`finish`), or all lines fall at once and it is lost. What is
  * queued and has not begun goes back to PLANNED. From interrupts only with finish = false. */
 void firing_stop(struct firing *firing, bool finish);
+/* The platform is not where it should be: what has begun is finished and lost. */
+void firing_spoil(struct firing *firing);
+bool firing_begun(const struct firing *firing); /* a shot is under way */
 bool firing_busy_now(const struct firing *firing); /* lines are up or queued, or exposures under way */
 enum shot_state firing_state(const struct firing *firing, uint32_t number);
 /* Queued or under way: its state is still to come. */

@@ -198,6 +198,21 @@ void firing_stop(struct firing *firing, bool finish)
     board->unlock(board->port, lock);
 }
 
+void firing_spoil(struct firing *firing)
+{
+    for (int i = 0; i < FIRING_SLOTS; i++)
+        if (firing->slots[i].use == SLOT_BEGUN)
+            firing->slots[i].late = true;
+}
+
+bool firing_begun(const struct firing *firing)
+{
+    for (int i = 0; i < FIRING_SLOTS; i++)
+        if (firing->slots[i].use == SLOT_BEGUN)
+            return true;
+    return false;
+}
+
 bool firing_busy_now(const struct firing *firing)
 {
     for (int i = 0; i < FIRING_SLOTS; i++)

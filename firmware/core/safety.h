@@ -24,7 +24,7 @@ struct safety {
     bool raw[BOARD_INPUTS];
     uint64_t changed[BOARD_INPUTS]; /* of raw */
     uint64_t heard;                 /* tick of the last heartbeat */
-    uint64_t supply_due;            /* when to look again */
+    uint64_t supply_due, speed_due; /* when to look again */
     int supply_mv;
     int supply_low;                 /* readings below the minimum, in a row */
 };

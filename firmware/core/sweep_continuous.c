@@ -1,0 +1,206 @@
+/* Sweeps at constant angular velocity: cameras fire as positions pass, or record by themselves. */
+#include "firmware/core/core_state.h"
+
+#include <math.h>
+
+#define CRUISE_MARGIN 0.05               /* s of cruise before the first exposure and after the last */
+#define RECORD_AHEAD (BOARD_TICK_HZ / 50) /* a record pulse is queued 20 ms ahead */
+#define RETRY_TICKS (BOARD_TICK_HZ / 1000)
+
+static bool video(const struct core *core)
+{
+    return core->plan.mode == LUMI_PLAN_VIDEO;
+}
+
+/* The last shot that is wanted; all after it are done. */
+static uint32_t last_shot(const struct core *core)
+{
+    uint32_t last = core->sweep.end - 1;
+
+    while (last > core->sweep.shot && !sweep_wanted(core, last))
+        last--;
+    return last;
+}
+
+static double half_exposure(const struct core *core)
+{
+    return video(core) ? 0 : core->plan.exposures[0] / 2;
+}
+
+/* From where: far enough before the first exposure to be at speed and to have taken up the backlash. */
+void sweep_plan_continuous(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+    const struct motion_limits limits = sweep_limits(core);
+    const double backlash = core->rig.control.motion.backlash * core->steps_per_turn / (2 * LUMI_PI);
+    const int64_t run_up = motion_run_up_steps(&limits);
+    const int first_turn = core->plan.first_turn + (video(core) ? s->turns_done : 0);
+    double first;
+
+    if (video(core)) {
+        s->mark = first_turn;
+        s->marks_end = core->plan.first_turn + core->plan.turns + 1;
+        first = s->mark * core->steps_per_turn;
+    } else {
+        first = sweep_position(core, s->shot);
+        s->mark = (int)ceil(first / core->steps_per_turn - 1e-9);
+        s->marks_end = core->plan.first_turn + core->plan.turns;
+    }
+    first -= limits.speed * (half_exposure(core) + CRUISE_MARGIN);
+    s->start = (int64_t)floor(first) - (run_up > backlash ? run_up : (int64_t)backlash + 1);
+}
+
+static void set_off(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+    const struct motion_limits limits = sweep_limits(core);
+    const double last = video(core) ? (s->marks_end - 1) * core->steps_per_turn : sweep_position(core, last_shot(core));
+    const double end = last + limits.speed * (half_exposure(core) + CRUISE_MARGIN);
+    const uint64_t lead = video(core) ? 0 : firing_lead(&core->firing, 0);
+
+    if (core_move(core, (int64_t)ceil(end) + motion_run_up_steps(&limits), &limits,
+                  core->now + CORE_START_TICKS + lead))
+        s->until = BOARD_NEVER; /* under way */
+}
+
+/* Queues the shots whose time has come near. */
+static void feed(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+    const uint64_t lead = firing_lead(&core->firing, 0) + SWEEP_AHEAD;
+
+    for (sweep_skip(core); s->shot < s->end; s->shot++, sweep_skip(core)) {
+        const double position = sweep_position(core, s->shot);
+        uint64_t middle = motion_time_of(&core->motion, position);
+        if (middle == BOARD_NEVER) {
+            firing_lose(&core->firing, s->shot, 0, core->now, position);
+            continue;
+        }
+        if (middle > core->now + lead) {
+            sweep_wake(core, middle - lead);
+            return;
+        }
+        if (!firing_shoot(&core->firing, s->shot, 0, middle, position)) {
+            sweep_wake(core, core->now + RETRY_TICKS);
+            return;
+        }
+    }
+}
+
+/* The lamp is told ahead, so that its first edge is not a poll late. */
+static void pass_marks(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+
+    while (s->mark < s->marks_end) {
+        uint64_t at = motion_time_of(&core->motion, s->mark * core->steps_per_turn);
+        if (at == BOARD_NEVER)
+            return;
+        if (at > core->now) {
+            sweep_wake(core, at);
+            return;
+        }
+        if (video(core)) {
+            lamp_send(&core->lamp, (unsigned)s->mark, core->now, core->rig.control.video.lamp_bit);
+            s->turns_done = s->mark - core->plan.first_turn;
+        }
+        sweep_mark(core, at);
+    }
+}
+
+static bool all_passed(const struct core *core)
+{
+    const struct sweep *s = &core->sweep;
+
+    return video(core) ? s->mark == s->marks_end : s->shot == s->end && !firing_busy_now(&core->firing);
+}
+
+static void poll_run(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+
+    if (motion_moving(&core->motion))
+        pass_marks(core);
+    if (s->intent != SWEEP_TO_REST && !video(core))
+        feed(core);
+    if (s->intent == SWEEP_TO_ROW_END && all_passed(core))
+        s->intent = SWEEP_TO_REST;
+    if (s->intent == SWEEP_TO_REST && !s->stopping && !firing_busy_now(&core->firing)) {
+        motion_stop(&core->motion);
+        s->stopping = true;
+    }
+    if (motion_moving(&core->motion)) {
+        sweep_wake(core, motion_end(&core->motion));
+        return;
+    }
+    if (firing_busy_now(&core->firing))
+        return; /* firing_poll wakes us */
+    if (video(core)) {
+        s->phase = SWEEP_UNRECORD;
+        s->until = 0;
+        sweep_wake(core, core->now);
+        return;
+    }
+    sweep_done(core);
+}
+
+/* Cameras that must hear a pulse to stop get it once the rig is at rest and the lamp's last code is out. */
+static void poll_unrecord(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+
+    if (core->lamp.next != 0 && s->intent == SWEEP_GO) {
+        sweep_wake(core, lamp_next_poll(&core->lamp));
+        return;
+    }
+    lamp_off(&core->lamp);
+    if (s->recording && core->firing.gate != GATE_OFF) {
+        s->recording = false;
+        firing_record(&core->firing, &core->rig, core->plan.cameras, false, core->now + RECORD_AHEAD);
+    }
+    if (!firing_busy_now(&core->firing))
+        sweep_done(core);
+    else
+        sweep_wake(core, core->now + RETRY_TICKS);
+}
+
+static void poll_record(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+
+    if (s->intent != SWEEP_GO) {
+        s->phase = SWEEP_UNRECORD;
+        sweep_wake(core, core->now);
+        return;
+    }
+    if (s->until == 0) {
+        s->until = core->now + CORE_SECONDS(core->rig.control.video.record_lead) + RECORD_AHEAD;
+        if (!s->recording)
+            firing_record(&core->firing, &core->rig, core->plan.cameras, true, core->now + RECORD_AHEAD);
+        s->recording = true;
+    }
+    if (core->now < s->until) {
+        sweep_wake(core, s->until);
+        return;
+    }
+    s->phase = SWEEP_RUN;
+    sweep_wake(core, core->now);
+}
+
+void sweep_poll_continuous(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+
+    switch (s->phase) {
+    case SWEEP_RECORD:
+        poll_record(core);
+        break;
+    case SWEEP_UNRECORD:
+        poll_unrecord(core);
+        break;
+    default:
+        if (s->until != BOARD_NEVER && s->intent == SWEEP_GO)
+            set_off(core);
+        poll_run(core);
+    }
+}
