@@ -103,10 +103,9 @@ static void jog(struct core *core, const lumi_wire_Jog *jog_command, lumi_wire_R
         core_refuse(reply, lumi_wire_Result_BAD, "jog: farther or faster than the rig goes");
         return;
     }
-    if (jog_command->turns > 0 &&
-        ((m->drive == LUMI_RIG_DRIVE_STEPPER && core->rig.control.safety.string_end_fitted &&
-          core->safety.inputs[BOARD_IN_STRING_END]) ||
-         (core->rig.control.safety.slack_fitted && core->safety.inputs[BOARD_IN_SLACK]))) {
+    if (jog_command->turns > 0 && ((m->drive == LUMI_RIG_DRIVE_STEPPER && core->rig.control.safety.string_end_fitted &&
+                                    core->safety.inputs[BOARD_IN_STRING_END]) ||
+                                   (core->rig.control.safety.slack_fitted && core->safety.inputs[BOARD_IN_SLACK]))) {
         core_refuse(reply, lumi_wire_Result_REFUSED, "jog: the string is paid out or loose; it only winds up");
         return;
     }

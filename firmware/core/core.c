@@ -22,8 +22,7 @@ struct motion_limits core_limits(const struct core *core, double speed)
     const struct lumi_rig_motion *m = &core->rig.control.motion;
     const double steps = core->steps_per_turn / (2 * LUMI_PI);
 
-    return (struct motion_limits){fmin(speed, m->speed_max) * steps, m->acceleration_max * steps,
-                                  m->jerk_max * steps};
+    return (struct motion_limits){fmin(speed, m->speed_max) * steps, m->acceleration_max * steps, m->jerk_max * steps};
 }
 
 bool core_move(struct core *core, int64_t target, const struct motion_limits *limits, uint64_t at)
@@ -209,8 +208,9 @@ void core_init(struct core *core, const struct board *board)
     identity.unique_id.size = BOARD_UNIQUE_ID;
     board->unique_id(board->port, identity.unique_id.bytes);
     motion_init(&core->motion, board);
+    homing_init(&core->homing, board);
     drop_string_init(core);
-    firing_init(&core->firing, board, core_report_shot, core_report_feedback, core);
+    firing_init(&core->firing, board, core->edges, core_report_shot, core_report_feedback, core);
     lamp_init(&core->lamp, board);
     lamp_off(&core->lamp);
     lumi_wire_server_init(&core->server, &ops, core, &identity);
@@ -256,9 +256,7 @@ uint64_t core_next_poll(const struct core *core)
     next = sooner(next, safety_next_poll(core));
     next = sooner(next, sweep_next_poll(core));
     next = sooner(next, drop_string_next_poll(core));
-    if (homing_active(&core->homing))
-        next = sooner(next, core->now + BOARD_TICK_HZ / 1000);
-    return next;
+    return sooner(next, homing_next_poll(&core->homing));
 }
 
 uint32_t core_on_step(struct core *core, uint64_t at)

@@ -14,6 +14,8 @@
 #include "firmware/core/sweep.h"
 #include "proto/wire/server.h"
 
+#include <assert.h>
+
 #define CORE_SECONDS(s) ((uint64_t)((s) * (double)BOARD_TICK_HZ + 0.5))
 #define CORE_START_TICKS (BOARD_TICK_HZ / 200) /* a move is begun this far ahead: 5 ms */
 
@@ -50,9 +52,17 @@ struct core {
 
     struct lumi_wire_server server;
     lumi_wire_Event event; /* being made */
-    struct profile_store_scratch store;
+    /* Profiles are loaded while nothing is fired: a message being decoded and the queued edges share their room. What
+     * is uploaded (store.data) stays while edges come and go. */
+    union {
+        struct profile_store_scratch store;
+        struct firing_edge edges[FIRING_EDGES];
+    };
     struct lumi_error error;
 };
+
+static_assert(FIRING_EDGES * sizeof(struct firing_edge) <= offsetof(struct profile_store_scratch, data),
+              "edges must not reach into what is uploaded");
 
 /* core.c */
 void core_state_event(struct core *core, enum state_event event);

@@ -39,8 +39,8 @@ static bool held_otherwise(const struct core *core)
            core->board->now(core->board->port) >= s->brake_at + DROP_STRING_BRAKE_TICKS;
 }
 
-/* After a reset the brake is closed (it closes without power). A watchdog's reset may have let go of the motor: it holds
- * again at once, whatever the profile says. */
+/* After a reset the brake is closed (it closes without power). A watchdog's reset may have let go of the motor: it
+ * holds again at once, whatever the profile says. */
 void drop_string_init(struct core *core)
 {
     const uint64_t now = core->board->now(core->board->port);

@@ -15,10 +15,11 @@ static uint64_t larger(uint64_t a, uint64_t b)
     return a > b ? a : b;
 }
 
-void firing_init(struct firing *firing, const struct board *board, firing_report report, firing_report_edge report_edge,
-                 void *context)
+void firing_init(struct firing *firing, const struct board *board, struct firing_edge *edges, firing_report report,
+                 firing_report_edge report_edge, void *context)
 {
-    *firing = (struct firing){.board = board, .report = report, .report_edge = report_edge, .context = context};
+    *firing = (struct firing){
+        .board = board, .edges = edges, .report = report, .report_edge = report_edge, .context = context};
     for (int i = 0; i < LUMI_RIG_FEEDBACKS; i++)
         firing->last_shot[i] = FIRING_NO_SHOT;
     board->trigger_lines(board->port, 0);

@@ -25,6 +25,7 @@
 enum shot_state { SHOT_PLANNED = 0, SHOT_FIRED = 1, SHOT_LOST = 2 };
 
 struct firing; /* firing_state.h */
+struct firing_edge;
 
 /* What is told of a shot when its last line has fallen and its last exposure is over (or when it is lost): for events.
  */
@@ -43,8 +44,9 @@ typedef void (*firing_report)(void *context, const struct shot_record *record);
 /* `shot`: whose exposure it is, or FIRING_NO_SHOT. */
 typedef void (*firing_report_edge)(void *context, int input, bool active, uint64_t at, uint32_t shot);
 
-void firing_init(struct firing *firing, const struct board *board, firing_report report, firing_report_edge report_edge,
-                 void *context);
+/* `edges`: room for FIRING_EDGES of them, the caller's; while nothing is busy it may hold something else. */
+void firing_init(struct firing *firing, const struct board *board, struct firing_edge *edges, firing_report report,
+                 firing_report_edge report_edge, void *context);
 /* Before a sweep: the cameras' numbers and the exposures. Shots keep their states; see firing_plan_again. */
 void firing_begin(struct firing *firing, const struct lumi_rig *rig, const struct lumi_plan *plan);
 /* Shots first .. first + count − 1 are PLANNED. */
@@ -67,7 +69,7 @@ uint64_t firing_spacing(const struct firing *firing, int from, int to, uint64_t 
 void firing_stop(struct firing *firing, bool finish);
 /* The platform is not where it should be: what has begun is finished and lost. */
 void firing_spoil(struct firing *firing);
-bool firing_begun(const struct firing *firing); /* a shot is under way */
+bool firing_begun(const struct firing *firing);    /* a shot is under way */
 bool firing_busy_now(const struct firing *firing); /* lines are up or queued, or exposures under way */
 enum shot_state firing_state(const struct firing *firing, uint32_t number);
 /* Queued or under way: its state is still to come. */

@@ -59,7 +59,7 @@ struct firing {
     uint32_t fired, lost;
     uint8_t states[LUMI_PLAN_SHOTS_MAX / 4];
     /* Shared with the interrupt, under lock. A ring of edges in order of time. */
-    struct firing_edge edges[FIRING_EDGES];
+    struct firing_edge *edges; /* FIRING_EDGES, the owner's; not touched while nothing is queued */
     uint16_t edge_first, edge_count;
     uint16_t armed;                   /* edges of the pattern that is pending in the board; 0: none */
     uint8_t holds[LUMI_RIG_CHANNELS]; /* by how many a line is held up */

@@ -92,6 +92,11 @@ int profile_store_load(const struct board *board, struct profile_store_scratch *
     return LUMI_OK;
 }
 
+const uint8_t *profile_store_data(const struct board *board, const struct profile_store_copy *copy)
+{
+    return board->flash_map(board->port, copy->slot) + HEADER;
+}
+
 /* Data in whole words; what is beyond its end stays erased. */
 static bool write_data(const struct board *board, int slot, const uint8_t *data, size_t size)
 {

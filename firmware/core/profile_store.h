@@ -31,6 +31,9 @@ struct profile_store_copy {
 int profile_store_load(const struct board *board, struct profile_store_scratch *scratch, struct lumi_rig *rig,
                        struct profile_store_copy *copy, struct lumi_error *error);
 
+/* The encoded profile of a copy that was loaded, in flash. */
+const uint8_t *profile_store_data(const struct board *board, const struct profile_store_copy *copy);
+
 /* Stores `size` bytes of an encoded profile that the caller has decoded and checked. Erases and writes flash: only at
  * rest. LUMI_ERR_IO: the flash refused or reads back differently, the old profile still counts. LUMI_ERR_VERSION: a
  * newer firmware's profile is there and `replace_newer` is false. LUMI_ERR_LIMIT: too big for a slot. */

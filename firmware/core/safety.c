@@ -2,8 +2,8 @@
 #include "firmware/core/core_state.h"
 
 #define SUPPLY_PERIOD (BOARD_TICK_HZ / 100)
-#define SUPPLY_READINGS 5       /* 50 ms below the minimum */
-#define SUPPLY_HYSTERESIS 1.03  /* cleared from so much above it */
+#define SUPPLY_READINGS 5      /* 50 ms below the minimum */
+#define SUPPLY_HYSTERESIS 1.03 /* cleared from so much above it */
 #define INDEX_BOUNCE (BOARD_TICK_HZ / 20)
 #define SPEED_TOLERANCE 1.02
 
@@ -12,7 +12,7 @@ static const char *const estop_text = "emergency stop";
 
 /* How long an input must say the same, in ms. */
 static const uint8_t debounce_ms[BOARD_INPUTS] = {
-    [BOARD_IN_ESTOP] = 0,  [BOARD_IN_INDEX] = 1,        [BOARD_IN_SLACK] = 20,  [BOARD_IN_STRING_END] = 5,
+    [BOARD_IN_ESTOP] = 0, [BOARD_IN_INDEX] = 1,        [BOARD_IN_SLACK] = 20,   [BOARD_IN_STRING_END] = 5,
     [BOARD_IN_WOUND] = 5, [BOARD_IN_DRIVER_FAULT] = 2, [BOARD_IN_REACHED] = 10,
 };
 
@@ -146,9 +146,8 @@ static const char *cause(const struct core *core, int fault)
                    ? "the supply is still low"
                    : NULL;
     case LUMI_RIG_FAULT_HOST_LOST:
-        return core->now > s->heard + CORE_SECONDS(core->rig.control.safety.host_timeout)
-                   ? "no heartbeat has come yet"
-                   : NULL;
+        return core->now > s->heard + CORE_SECONDS(core->rig.control.safety.host_timeout) ? "no heartbeat has come yet"
+                                                                                          : NULL;
     default:
         return NULL;
     }
@@ -231,8 +230,8 @@ static void watch_supply(struct core *core)
         safety_raise(core, LUMI_RIG_FAULT_SUPPLY, "the supply is low");
 }
 
-/* The platform's own speed, by the time between two leading edges of the index mark in one direction; and the speed that
- * was planned, which no planner of ours exceeds. */
+/* The platform's own speed, by the time between two leading edges of the index mark in one direction; and the speed
+ * that was planned, which no planner of ours exceeds. */
 static void watch_speed(struct core *core)
 {
     struct safety *s = &core->safety;

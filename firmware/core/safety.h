@@ -13,20 +13,20 @@
 struct core;
 
 struct safety {
-    uint32_t standing;              /* bit a fault */
-    volatile bool estop_seen;       /* by the interrupt, until the fault is raised */
-    volatile bool index_seen;       /* the last leading edge of the index mark … */
-    volatile uint64_t index_at;     /* … its tick … */
-    volatile int64_t index_step;    /* … and the step it fell on */
-    uint64_t index_before;          /* the edge before that, for the time between them; 0: none */
+    uint32_t standing;           /* bit a fault */
+    volatile bool estop_seen;    /* by the interrupt, until the fault is raised */
+    volatile bool index_seen;    /* the last leading edge of the index mark … */
+    volatile uint64_t index_at;  /* … its tick … */
+    volatile int64_t index_step; /* … and the step it fell on */
+    uint64_t index_before;       /* the edge before that, for the time between them; 0: none */
     int64_t index_step_before;
-    bool inputs[BOARD_INPUTS];      /* debounced */
+    bool inputs[BOARD_INPUTS]; /* debounced */
     bool raw[BOARD_INPUTS];
     uint64_t changed[BOARD_INPUTS]; /* of raw */
     uint64_t heard;                 /* tick of the last heartbeat */
     uint64_t supply_due, speed_due; /* when to look again */
     int supply_mv;
-    int supply_low;                 /* readings below the minimum, in a row */
+    int supply_low; /* readings below the minimum, in a row */
 };
 
 void safety_init(struct core *core);

@@ -134,9 +134,19 @@ bool state_sweeping(lumi_wire_State state)
 
 const char *state_name(lumi_wire_State state)
 {
-    static const char *const names[STATES] = {"starting", "without a profile", "lost",    "idle",
-                                              "homing",   "jogging",           "winding", "sweeping",
-                                              "pausing",  "paused",            "stopping", "stopped by a fault",
-                                              "stopped by a fault, position lost", "testing triggers"};
+    static const char *const names[STATES] = {"starting",
+                                              "without a profile",
+                                              "lost",
+                                              "idle",
+                                              "homing",
+                                              "jogging",
+                                              "winding",
+                                              "sweeping",
+                                              "pausing",
+                                              "paused",
+                                              "stopping",
+                                              "stopped by a fault",
+                                              "stopped by a fault, position lost",
+                                              "testing triggers"};
     return (unsigned)state < STATES ? names[state] : "unknown";
 }

@@ -1,5 +1,5 @@
-/* The states of the board (rig.proto, State) and what each event makes of them: one table. Whether the position is known
- * is part of the state. */
+/* The states of the board (rig.proto, State) and what each event makes of them: one table. Whether the position is
+ * known is part of the state. */
 #ifndef LUMI_FIRMWARE_CORE_STATES_H
 #define LUMI_FIRMWARE_CORE_STATES_H
 
@@ -35,10 +35,10 @@ enum state_event {
 
 /* What the table says beside a state. */
 enum state_answer {
-    STATE_MISSING = 0,  /* no cell may be */
-    STATE_REFUSE = 64,  /* a command that is not for this state */
-    STATE_IMPOSSIBLE,   /* cannot be: an internal fault */
-    STATE_STAY          /* nothing changes */
+    STATE_MISSING = 0, /* no cell may be */
+    STATE_REFUSE = 64, /* a command that is not for this state */
+    STATE_IMPOSSIBLE,  /* cannot be: an internal fault */
+    STATE_STAY         /* nothing changes */
 };
 
 /* A lumi_wire_State, or a state_answer. */

@@ -1,10 +1,12 @@
 /* The plan on board: a whole sweep, from winding to the last shot, without the host.
  *
- * 1. Shots are numbered as the plan numbers them (proto/mechanism/sweep_plan.h); a group is the bracket of one position.
+ * 1. Shots are numbered as the plan numbers them (proto/mechanism/sweep_plan.h); a group is the bracket of one
+ * position.
  * 2. A sweep that ends early ends at a safe place: shots that have begun are finished first (unless it must stop at
  *    once), then it slows down; what was not begun stays planned. Going on turns back, runs up anew and takes up the
  *    backlash.
- * 3. The middle of every exposure falls where the motion's curve passes its position; a position may lie between steps. */
+ * 3. The middle of every exposure falls where the motion's curve passes its position; a position may lie between steps.
+ */
 #ifndef LUMI_FIRMWARE_CORE_SWEEP_H
 #define LUMI_FIRMWARE_CORE_SWEEP_H
 
@@ -33,26 +35,26 @@ struct sweep {
     enum sweep_intent intent;
     lumi_wire_SweepEnded_How how; /* if it ends now */
     bool only_missing;
-    bool stopping;    /* motion was told to stop */
-    bool full_wound;  /* wind full: the way up is behind us */
+    bool stopping;   /* motion was told to stop */
+    bool full_wound; /* wind full: the way up is behind us */
     bool external;
-    bool recording;   /* the cameras have had their start pulse, and no stop */
-    uint32_t shot;    /* the next to be queued */
-    uint32_t end;     /* one past the last */
-    int64_t start;    /* step from which the sweep runs up */
+    bool recording;      /* the cameras have had their start pulse, and no stop */
+    uint32_t shot;       /* the next to be queued */
+    uint32_t end;        /* one past the last */
+    int64_t start;       /* step from which the sweep runs up */
     double per_position; /* steps */
-    int mark;         /* the next turn mark */
-    int marks_end;    /* one past the last */
-    uint64_t wake;    /* when sweep_poll has something to do; BOARD_NEVER: when something else happens */
-    uint64_t until;   /* record lead, timeouts */
+    int mark;            /* the next turn mark */
+    int marks_end;       /* one past the last */
+    uint64_t wake;       /* when sweep_poll has something to do; BOARD_NEVER: when something else happens */
+    uint64_t until;      /* record lead, timeouts */
     /* Start-stop. */
-    uint64_t cycle;    /* tick at which the position's move was due */
-    uint64_t period;   /* position to position */
-    uint64_t middle;   /* of the last queued exposure, for the next one's spacing … */
-    int exposure;      /* … and which; −1: none before */
-    uint64_t ready_at; /* settled */
+    uint64_t cycle;                  /* tick at which the position's move was due */
+    uint64_t period;                 /* position to position */
+    uint64_t middle;                 /* of the last queued exposure, for the next one's spacing … */
+    int exposure;                    /* … and which; −1: none before */
+    uint64_t ready_at;               /* settled */
     uint32_t group_first, group_end; /* the shots of this position */
-    int turns_done;    /* video: turns that were recorded whole */
+    int turns_done;                  /* video: turns that were recorded whole */
 };
 
 /* Begins: NULL, or why not. The state must allow it. */
@@ -73,7 +75,7 @@ uint32_t sweep_next_shot(const struct core *core);
 /* Between sweep.c and the modes: sweep_continuous.c (video too), sweep_start_stop.c (external drive too). */
 double sweep_position(const struct core *core, uint32_t shot); /* steps */
 bool sweep_wanted(const struct core *core, uint32_t shot);
-void sweep_skip(struct core *core);                            /* `shot` to the next that is wanted */
+void sweep_skip(struct core *core); /* `shot` to the next that is wanted */
 void sweep_wake(struct core *core, uint64_t at);
 void sweep_done(struct core *core); /* at rest, over */
 struct motion_limits sweep_limits(const struct core *core);

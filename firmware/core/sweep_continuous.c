@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#define CRUISE_MARGIN 0.05               /* s of cruise before the first exposure and after the last */
+#define CRUISE_MARGIN 0.05                /* s of cruise before the first exposure and after the last */
 #define RECORD_AHEAD (BOARD_TICK_HZ / 50) /* a record pulse is queued 20 ms ahead */
 #define RETRY_TICKS (BOARD_TICK_HZ / 1000)
 

@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define LUMI_WIRE_EVENT_BYTES 12288
+#define LUMI_WIRE_EVENT_BYTES 8192
 #define LUMI_WIRE_EVENT_MAX lumi_wire_Event_size /* bytes of one */
 
 struct lumi_wire_events {
