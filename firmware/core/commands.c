@@ -250,6 +250,36 @@ static void enter_loader(struct core *core, lumi_wire_Reply *reply)
         core->board->enter_loader(core->board->port);
 }
 
+/* What is given and taken: commands_store.c. */
+static void execute_store(struct core *core, const lumi_wire_Request *request, lumi_wire_Reply *reply)
+{
+    switch (request->which_command) {
+    case lumi_wire_Request_load_plan_tag:
+        core_command_load_plan(core, &request->command.load_plan, reply);
+        break;
+    case lumi_wire_Request_read_shots_tag:
+        core_command_read_shots(core, &request->command.read_shots, reply);
+        break;
+    case lumi_wire_Request_mark_shots_tag:
+        core_command_mark_shots(core, &request->command.mark_shots, reply);
+        break;
+    case lumi_wire_Request_read_profile_tag:
+        core_command_read_profile(core, &request->command.read_profile, reply);
+        break;
+    case lumi_wire_Request_write_profile_tag:
+        core_command_write_profile(core, &request->command.write_profile, reply);
+        break;
+    case lumi_wire_Request_commit_profile_tag:
+        core_command_commit_profile(core, &request->command.commit_profile, reply);
+        break;
+    case lumi_wire_Request_read_plan_tag:
+        core_command_read_plan(core, reply);
+        break;
+    default:
+        core_refuse(reply, lumi_wire_Result_UNSUPPORTED, "no such command");
+    }
+}
+
 void core_execute(void *context, const lumi_wire_Request *request, lumi_wire_Reply *reply)
 {
     struct core *core = context;
@@ -268,9 +298,6 @@ void core_execute(void *context, const lumi_wire_Request *request, lumi_wire_Rep
     case lumi_wire_Request_test_triggers_tag:
         test_triggers(core, &request->command.test_triggers, reply);
         break;
-    case lumi_wire_Request_load_plan_tag:
-        core_command_load_plan(core, &request->command.load_plan, reply);
-        break;
     case lumi_wire_Request_start_sweep_tag:
         start_sweep(core, &request->command.start_sweep, reply);
         break;
@@ -283,21 +310,6 @@ void core_execute(void *context, const lumi_wire_Request *request, lumi_wire_Rep
     case lumi_wire_Request_clear_tag:
         clear(core, request->command.clear.faults, reply);
         break;
-    case lumi_wire_Request_read_shots_tag:
-        core_command_read_shots(core, &request->command.read_shots, reply);
-        break;
-    case lumi_wire_Request_mark_shots_tag:
-        core_command_mark_shots(core, &request->command.mark_shots, reply);
-        break;
-    case lumi_wire_Request_read_profile_tag:
-        core_command_read_profile(core, &request->command.read_profile, reply);
-        break;
-    case lumi_wire_Request_write_profile_tag:
-        core_command_write_profile(core, &request->command.write_profile, reply);
-        break;
-    case lumi_wire_Request_commit_profile_tag:
-        core_command_commit_profile(core, &request->command.commit_profile, reply);
-        break;
     case lumi_wire_Request_enter_loader_tag:
         enter_loader(core, reply);
         break;
@@ -307,10 +319,7 @@ void core_execute(void *context, const lumi_wire_Request *request, lumi_wire_Rep
     case lumi_wire_Request_set_output_tag:
         set_output(core, &request->command.set_output, reply);
         break;
-    case lumi_wire_Request_read_plan_tag:
-        core_command_read_plan(core, reply);
-        break;
     default:
-        core_refuse(reply, lumi_wire_Result_UNSUPPORTED, "no such command");
+        execute_store(core, request, reply);
     }
 }

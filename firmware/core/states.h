@@ -3,7 +3,7 @@
 #ifndef LUMI_FIRMWARE_CORE_STATES_H
 #define LUMI_FIRMWARE_CORE_STATES_H
 
-#include <rig.pb.h>
+#include "proto/wire/message.h"
 
 #include <stdbool.h>
 

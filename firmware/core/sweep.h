@@ -13,7 +13,7 @@
 #include "firmware/core/motion.h"
 #include "proto/mechanism/sweep_plan.h"
 
-#include <rig.pb.h>
+#include "proto/wire/message.h"
 
 struct core;
 
