@@ -195,10 +195,10 @@ static void on_welcome(struct lumi_wire_client *client, const lumi_wire_Welcome 
     bool lost = client->in_flight && !goes_on(client, welcome);
     uint32_t number = client->number;
 
-    if (restarted)
-        client->events_next = 0;
-    else if (!client->welcomed)
-        client->events_next = welcome->events_first;
+    if (restarted || !client->welcomed) {
+        client->events_next = restarted ? 0 : welcome->events_first;
+        memset(client->early_kept, 0, sizeof client->early_kept);
+    }
     if (lost)
         client->in_flight = false;
     if (!client->in_flight)
@@ -235,7 +235,49 @@ static void on_reply(struct lumi_wire_client *client, const lumi_wire_Reply *rep
     }
 }
 
-static void on_event(struct lumi_wire_client *client, const lumi_wire_Event *event, uint64_t now_ns)
+/* The event after the last one that was handed on, if it came early. It is taken out before it is handed on: the
+ * callback may do anything. */
+static bool take_early(struct lumi_wire_client *client, lumi_wire_Event *event)
+{
+    uint32_t place = client->events_next % LUMI_WIRE_EARLY;
+
+    if (!client->early_kept[place])
+        return false;
+    client->early_kept[place] = false;
+    *event = client->early[place];
+    return event->number == client->events_next;
+}
+
+static void hand_on(struct lumi_wire_client *client, const lumi_wire_Event *event)
+{
+    client->events_next = event->number + 1;
+    client->ops->event(client->context, event);
+}
+
+/* Up to the oldest that the board still keeps: the early ones are handed on, the missing ones counted. */
+static void skip_to(struct lumi_wire_client *client, uint32_t oldest)
+{
+    lumi_wire_Event event;
+    uint32_t missing = 0;
+
+    for (int i = 0; i < LUMI_WIRE_EARLY && client->events_next != oldest; i++) {
+        if (!take_early(client, &event)) {
+            client->events_next++;
+            missing++;
+            continue;
+        }
+        if (missing > 0)
+            client->ops->events_lost(client->context, missing);
+        missing = 0;
+        hand_on(client, &event);
+    }
+    missing += oldest - client->events_next; /* nothing that far ahead waits */
+    client->events_next = oldest;
+    if (missing > 0)
+        client->ops->events_lost(client->context, missing);
+}
+
+static void on_event(struct lumi_wire_client *client, lumi_wire_Event *event, uint64_t now_ns)
 {
     int32_t kept = (int32_t)(event->number - event->oldest);
 
@@ -245,19 +287,21 @@ static void on_event(struct lumi_wire_client *client, const lumi_wire_Event *eve
         client->acknowledge = true;
         client->heartbeat_due_ns = earlier(client->heartbeat_due_ns, now_ns + LUMI_WIRE_ACKNOWLEDGE_NS);
     }
-    int32_t missing = (int32_t)(event->oldest - client->events_next);
-    if (missing > 0) {
-        client->events_next = event->oldest;
-        client->ops->events_lost(client->context, (uint32_t)missing);
-    }
+    if ((int32_t)(event->oldest - client->events_next) > 0)
+        skip_to(client, event->oldest);
     int32_t ahead = (int32_t)(event->number - client->events_next);
     if (ahead < 0) {
         client->duplicates++;
     } else if (ahead > 0) {
         client->gaps++;
+        if (ahead < LUMI_WIRE_EARLY) {
+            client->early[event->number % LUMI_WIRE_EARLY] = *event;
+            client->early_kept[event->number % LUMI_WIRE_EARLY] = true;
+        }
     } else {
-        client->events_next++;
-        client->ops->event(client->context, event);
+        do {
+            hand_on(client, event);
+        } while (take_early(client, event));
     }
 }
 

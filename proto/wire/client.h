@@ -6,7 +6,8 @@
  * 2. The session stays over reconnections and is found again by the host's number; a request in flight is sent again
  *    in it. Another token means that the board restarted or forgot us: what was in flight is reported lost.
  * 3. An event is handed on if it is the next one. What the board no longer keeps is counted and reported before the
- *    next event; what came before is dropped; what comes too early is dropped and comes again.
+ *    next event; what came before is dropped; what comes too early waits, if it is less than LUMI_WIRE_EARLY before its
+ *    time, and comes again otherwise.
  * 4. Callbacks come from receive only, and may call everything but receive. */
 #ifndef LUMI_PROTO_WIRE_CLIENT_H
 #define LUMI_PROTO_WIRE_CLIENT_H
@@ -23,6 +24,7 @@ extern "C" {
 #define LUMI_WIRE_HEARTBEAT_NS 500000000u  /* between heartbeats where no event is to be acknowledged */
 #define LUMI_WIRE_ACKNOWLEDGE_NS 40000000u /* an event is acknowledged at most this late, with others */
 #define LUMI_WIRE_ROOM_NS 5000000u         /* a stream that took nothing is tried again after this */
+#define LUMI_WIRE_EARLY 64                 /* events that wait for one before them */
 #define LUMI_WIRE_STOPS 50                 /* an emergency stop that is not confirmed is sent so often */
 
 struct lumi_wire_client_ops {
@@ -70,6 +72,8 @@ struct lumi_wire_client {
     size_t request_size;
     uint32_t retries, duplicates; /* requests sent again; replies and events that came again */
     uint32_t gaps, unread;        /* events that came too early; frames whose payload is no message */
+    bool early_kept[LUMI_WIRE_EARLY];
+    lumi_wire_Event early[LUMI_WIRE_EARLY]; /* by their number, modulo */
 };
 
 /* `host`: random, not 0; the same for as long as this client lives, over every reconnection. */

@@ -1,2 +1,3 @@
 lumi_test(test_wire_frame FOLDERS wire)
 lumi_test(test_wire_session FOLDERS wire)
+lumi_test(test_wire_torture FOLDERS wire)
