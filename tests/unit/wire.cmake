@@ -1,3 +1,3 @@
-lumi_test(test_wire_frame FOLDERS wire)
-lumi_test(test_wire_session FOLDERS wire)
-lumi_test(test_wire_torture FOLDERS wire)
+foreach(test frame session refusals events message profile torture)
+  lumi_test(test_wire_${test} FOLDERS wire)
+endforeach()
