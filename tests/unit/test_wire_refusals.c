@@ -1,5 +1,5 @@
-/* proto/wire: what the ends of a link do not take from one another: other versions, commands of later ones, requests that
- * do not fit, numbers that are none, texts that are no line. */
+/* proto/wire: what the ends of a link do not take from one another: other versions, commands of later ones, requests
+ * that do not fit, numbers that are none, texts that are no line. */
 #include "wire_bench.h"
 
 #include <math.h>
