@@ -9,9 +9,10 @@
 #define HORIZON (BOARD_TICK_HZ / 40)     /* planned ahead */
 #define START_LEAD (BOARD_TICK_HZ / 500) /* from motion_start to the curve's begin: time to plan its first segments */
 #define FIRST_SEGMENTS 4                 /* planned by motion_start itself */
-#define SEGMENT_SECONDS_MAX 0.005
-#define SEGMENT_SECONDS_MIN 0.0001 /* a ramp that takes milliseconds bends less than a tick in that */
-#define ONE 4294967296.0           /* 2^32: a tick in an interval's units */
+#define POLL_SEGMENTS 16 /* planned by one call: some half a millisecond's work, at least 3 ms of motion */
+#define SEGMENT_SECONDS_MAX 0.005F
+#define SEGMENT_SECONDS_MIN 0.0002F /* a ramp that takes milliseconds bends by a few ticks in that */
+#define ONE 4294967296.0            /* 2^32: a tick in an interval's units */
 
 void motion_init(struct motion *motion, const struct board *board)
 {
@@ -95,28 +96,38 @@ void motion_release(struct motion *motion)
 /* Planning. */
 
 /* How far a parabola through a segment's ends strays from the curve, ticks: t(x) has the third derivative 3 a² / v⁵ −
- * j / v⁴, and s (s − n/2) (s − n) is at most n³ √3 / 36 in 0 … n. */
-static double bend(const struct ramp_phase *at, double n)
+ * j / v⁴, and s (s − n/2) (s − n) is at most n³ √3 / 36 in 0 … n. An estimate: single precision, which is hardware. */
+static float bend(const struct ramp_phase *at, float n)
 {
-    double w = n / at->v, aw = at->a * w / at->v, jw = at->j * w * w / at->v;
+    float v = (float)at->v, w = n / v, aw = (float)at->a * w / v, jw = (float)at->j * w * w / v;
 
-    return BOARD_TICK_HZ * w * fabs(3 * aw * aw - jw) * (0.0481125 / 6);
+    return BOARD_TICK_HZ * (0.0481125F / 6) * w * fabsf(3 * aw * aw - jw);
 }
 
 /* The most it bends between two places of the curve: at its ends, and where a phase begins in between. */
-static double most_bend(const struct ramp *ramp, const struct ramp_phase *from, const struct ramp_phase *to, double n)
+static float most_bend(const struct ramp *ramp, const struct ramp_phase *from, const struct ramp_phase *to, float n)
 {
-    double most = fmax(bend(from, n), bend(to, n));
+    float most = fmaxf(bend(from, n), bend(to, n));
 
     for (int i = 1; i < ramp->count; i++)
         if (ramp->phases[i].t > from->t && ramp->phases[i].t < to->t)
-            most = fmax(most, bend(&ramp->phases[i], n));
+            most = fmaxf(most, bend(&ramp->phases[i], n));
     return most;
 }
 
-static double time_of_pulse(const struct motion *motion, int64_t pulse, double guess)
+static double time_of_pulse(const struct motion *motion, int64_t pulse)
 {
-    return ramp_time(&motion->ramp, (double)pulse + 0.5, guess);
+    return ramp_time(&motion->ramp, (double)pulse + 0.5);
+}
+
+/* The state n pulses on from `at`, looked for where the first three terms of t(x) lead. */
+static void pulse_after(const struct motion *motion, const struct ramp_phase *at, uint32_t n, struct ramp_phase *state)
+{
+    double w = n * motion->at_last.inverse, bent = at->a * w * motion->at_last.inverse;
+    double jerked = at->j * w * w * motion->at_last.inverse;
+    double guess = at->t + w * (1 - bent * (0.5 - 0.5 * bent) - jerked * (1.0 / 6));
+
+    ramp_pass(&motion->ramp, at->x + n, guess, state);
 }
 
 /* Puts the segment from the last planned pulse to pulse last + n into the queue: it ends at the tick, and the fraction,
@@ -126,19 +137,23 @@ static void put_segment(struct motion *motion, uint32_t n, const struct ramp_pha
     unsigned head = motion->head;
     struct motion_segment *s = &motion->segments[head % MOTION_SEGMENTS];
     double ticks = end->t * BOARD_TICK_HZ + 0.5 - (double)motion->at_last.ticks;
-    double whole = ticks * ONE - motion->at_last.fraction, add = 0;
+    double interval = ticks * ONE - motion->at_last.fraction, inverse = 1 / end->v;
 
-    if (n > 1)
-        add = (1 / end->v - 1 / motion->at_last.v) * (BOARD_TICK_HZ * ONE) / n;
-    s->add = (int64_t)floor(add + 0.5);
-    s->interval = (uint64_t)floor(whole / n - (double)s->add * (n - 1) / 2 + 0.5);
     s->count = n;
+    s->add = 0;
+    if (n > 1) {
+        double share = 1.0 / n;
+        double add = (inverse - motion->at_last.inverse) * (BOARD_TICK_HZ * ONE) * share;
+        s->add = (int64_t)floor(add + 0.5);
+        interval = interval * share - (double)s->add * (0.5 * (n - 1));
+    }
+    s->interval = (uint64_t)(interval + 0.5);
 
-    int64_t sum = (int64_t)s->interval * n + s->add * ((int64_t)n * (n - 1) / 2) + motion->at_last.fraction;
-    motion->at_last.ticks += (uint64_t)(sum >> 32);
+    uint64_t sum = s->interval * n + (uint64_t)(s->add * ((int64_t)n * (n - 1) / 2)) + motion->at_last.fraction;
+    motion->at_last.ticks += sum >> 32;
     motion->at_last.fraction = (uint32_t)sum;
-    motion->at_last.t = end->t;
-    motion->at_last.v = end->v;
+    motion->at_last.curve = *end;
+    motion->at_last.inverse = inverse;
     motion->last += n;
     motion->stride = n;
     motion->safe_until = motion->origin + motion->at_last.ticks - ((s->interval + (uint64_t)s->add * (n - 1)) >> 32);
@@ -148,27 +163,26 @@ static void put_segment(struct motion *motion, uint32_t n, const struct ramp_pha
 /* Plans one segment more: as long as lets the parabola be within half the tolerance. */
 static void plan_segment(struct motion *motion)
 {
-    struct ramp_phase here, end;
-    double v = motion->at_last.v, t = motion->at_last.t;
+    const struct ramp_phase here = motion->at_last.curve;
+    struct ramp_phase end;
+    float v = (float)here.v, limit = MOTION_RAMP_TICKS / 2.0F - 1;
     int64_t left = motion->pulses - 1 - motion->last;
-    double longest = fmin(fmax(floor(v * SEGMENT_SECONDS_MAX), 1), (double)left);
-    double shortest = fmin(fmax(floor(v * SEGMENT_SECONDS_MIN), 1), longest);
-    const double limit = MOTION_RAMP_TICKS / 2.0 - 1;
-    double n = fmin(fmax(motion->stride, shortest), longest);
+    uint32_t longest = v * SEGMENT_SECONDS_MAX > 1 ? (uint32_t)(v * SEGMENT_SECONDS_MAX) : 1;
+    uint32_t shortest = v * SEGMENT_SECONDS_MIN > 1 ? (uint32_t)(v * SEGMENT_SECONDS_MIN) : 1;
+    uint32_t n = motion->stride;
 
-    ramp_at(&motion->ramp, t, &here);
-    here.v = v;
-    while (n < longest && bend(&here, 2 * n) < limit)
-        n = fmin(2 * n, longest);
+    longest = longest < left ? longest : (uint32_t)left;
+    shortest = shortest < longest ? shortest : longest;
+    n = n > longest ? longest : n < shortest ? shortest : n;
+    while (n < longest && bend(&here, 2 * (float)n) < limit)
+        n = 2 * n < longest ? 2 * n : longest;
     for (;;) {
-        double guess = t + n / v;
-        double at = time_of_pulse(motion, motion->last + (int64_t)n, guess);
-        ramp_at(&motion->ramp, at, &end);
-        if (n <= shortest || most_bend(&motion->ramp, &here, &end, n) <= limit)
+        pulse_after(motion, &here, n, &end);
+        if (n <= shortest || most_bend(&motion->ramp, &here, &end, (float)n) <= limit)
             break;
-        n = fmax(floor(n / 2), shortest);
+        n = n / 2 > shortest ? n / 2 : shortest;
     }
-    put_segment(motion, (uint32_t)n, &end);
+    put_segment(motion, n, &end);
 }
 
 void motion_poll(struct motion *motion)
@@ -180,8 +194,9 @@ void motion_poll(struct motion *motion)
         motion->next_poll = BOARD_NEVER;
         return;
     }
-    while (motion->last < motion->pulses - 1 && motion->head - motion->tail < MOTION_SEGMENTS &&
-           motion->safe_until < now + HORIZON)
+    for (int n = 0; n < POLL_SEGMENTS && motion->last < motion->pulses - 1 && motion->safe_until < now + HORIZON &&
+                    motion->head - motion->tail < MOTION_SEGMENTS;
+         n++)
         plan_segment(motion);
     if (motion->last == motion->pulses - 1)
         motion->planned = true;
@@ -212,11 +227,13 @@ static bool limits_in_range(const struct motion_limits *limits)
     return slowest * BOARD_TICK_HZ < 1073741824.0 && limits->speed * 100 <= BOARD_TICK_HZ;
 }
 
-/* Plans the first segments; returns the interval after the first pulse (0: there is but one). */
-static uint32_t plan_start(struct motion *motion, uint64_t now, uint64_t at)
+/* Plans the first segments: the first pulse comes at tick *pulse, the next so many ticks later (0: there is none). */
+static uint32_t plan_start(struct motion *motion, uint64_t now, uint64_t at, uint64_t *pulse)
 {
-    struct ramp_phase first;
-    double t = time_of_pulse(motion, 0, -1), ticks = t * BOARD_TICK_HZ + 0.5;
+    struct ramp_phase *curve = &motion->at_last.curve;
+
+    ramp_pass(&motion->ramp, 0.5, -1, curve);
+    double ticks = curve->t * BOARD_TICK_HZ + 0.5;
     uint64_t start = now + START_LEAD;
 
     if (start < motion->rest_at)
@@ -225,11 +242,10 @@ static uint32_t plan_start(struct motion *motion, uint64_t now, uint64_t at)
         start = at;
     if (start + (uint64_t)ticks < now + motion->direction_setup)
         start = now + motion->direction_setup;
-    ramp_at(&motion->ramp, t, &first);
+    motion->at_last.inverse = 1 / curve->v;
     motion->origin = start;
+    *pulse = start + (uint64_t)ticks;
     motion->last = 0;
-    motion->at_last.t = t;
-    motion->at_last.v = first.v;
     motion->at_last.ticks = (uint64_t)ticks;
     motion->at_last.fraction = (uint32_t)((ticks - floor(ticks)) * ONE);
     motion->fraction = motion->at_last.fraction;
@@ -256,8 +272,8 @@ static bool start(struct motion *motion, int64_t steps, const struct motion_limi
     motion->from = motion->position;
     motion->pulses = steps > 0 ? steps : -steps;
     ramp_plan(&motion->ramp, (double)motion->pulses, limits);
-    uint32_t first = plan_start(motion, now, at);
-    uint64_t pulse = motion->origin + (uint64_t)(time_of_pulse(motion, 0, -1) * BOARD_TICK_HZ + 0.5);
+    uint64_t pulse;
+    uint32_t first = plan_start(motion, now, at, &pulse);
 
     unsigned state = board->lock(board->port);
     bool free = !motion->halted;
@@ -287,7 +303,7 @@ void motion_stop(struct motion *motion)
 {
     if (!motion->running || motion->planned)
         return;
-    ramp_stop(&motion->ramp, motion->at_last.t, &motion->limits);
+    ramp_stop(&motion->ramp, motion->at_last.curve.t, &motion->limits);
     int64_t pulses = pulses_to(ramp_end_place(&motion->ramp));
     if (pulses < motion->pulses)
         motion->pulses = pulses > motion->last ? pulses : motion->last + 1;
@@ -340,14 +356,14 @@ uint64_t motion_time_of(const struct motion *motion, double position)
 
     if (!motion->curve || motion->halted || !(x >= 0 && x <= ramp_end_place(&motion->ramp)))
         return BOARD_NEVER;
-    return tick_of(motion, ramp_time(&motion->ramp, x, -1));
+    return tick_of(motion, ramp_time(&motion->ramp, x));
 }
 
 uint64_t motion_end(const struct motion *motion)
 {
     if (!motion->curve || motion->halted)
         return BOARD_NEVER;
-    return tick_of(motion, time_of_pulse(motion, motion->pulses - 1, -1));
+    return tick_of(motion, time_of_pulse(motion, motion->pulses - 1));
 }
 
 double motion_speed(const struct motion *motion, uint64_t now)

@@ -44,9 +44,10 @@ struct motion {
     int64_t pulses;      /* of the move */
     int64_t last;        /* number of the last pulse that is in the queue, from 0 */
     struct {
-        double t, v;       /* when it comes by the curve, s; the speed there */
-        uint64_t ticks;    /* when it comes, from the origin … */
-        uint32_t fraction; /* … and 2⁻³² of a tick, half a tick added */
+        struct ramp_phase curve; /* when it comes by the curve, the speed there … */
+        double inverse;          /* 1 / speed */
+        uint64_t ticks;          /* when it comes, from the origin … */
+        uint32_t fraction;       /* … and 2⁻³² of a tick, half a tick added */
     } at_last;
     uint32_t stride; /* steps the segment before had */
     bool curve;      /* there is a curve to ask about */

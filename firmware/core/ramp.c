@@ -8,12 +8,12 @@
 /* The state `s` seconds into a phase. */
 static void phase_at(const struct ramp_phase *p, double s, struct ramp_phase *state)
 {
-    double half = p->j * s / 2;
+    double js = p->j * s;
 
     state->t = p->t + s;
-    state->x = p->x + s * (p->v + s * (p->a / 2 + half / 3));
-    state->v = p->v + s * (p->a + half);
-    state->a = p->a + 2 * half;
+    state->x = p->x + s * (p->v + s * (0.5 * p->a + js * (1.0 / 6)));
+    state->v = p->v + s * (p->a + 0.5 * js);
+    state->a = p->a + js;
     state->j = p->j;
 }
 
@@ -106,50 +106,69 @@ void ramp_stop(struct ramp *ramp, double t, const struct motion_limits *limits)
     set_rest(ramp, ramp->phases[ramp->count].x);
 }
 
-/* x(s) = x in a phase that lasts `seconds`: Newton's steps, halving where they lead out of the bracket. */
-static double solve_phase(const struct ramp_phase *p, double seconds, double x, double s)
+#define CLOSE 1e-7 /* s; the error of Newton's next step is the square of the last, times acceleration by speed */
+
+/* The state where a phase that lasts `seconds` passes x, looked for from `s` on: Newton's steps, halving where they
+ * lead out of the bracket. */
+static void solve_phase(const struct ramp_phase *p, double seconds, double x, double s, struct ramp_phase *state)
 {
     double low = 0, high = seconds;
 
-    if (p->a == 0 && p->j == 0)
-        return fmin(fmax((x - p->x) / p->v, 0), seconds);
-    if (!(s >= low && s <= high))
-        s = seconds / 2;
-    for (int i = 0; i < 80; i++) {
-        struct ramp_phase at;
-        phase_at(p, s, &at);
-        double over = at.x - x;
+    if (!(s > low && s < high))
+        s = p->v == 0 ? fmin(cbrt(6 * (x - p->x) / p->j), seconds) : 0.5 * seconds;
+    for (int i = 0; i < 100; i++) {
+        phase_at(p, s, state);
+        double over = state->x - x;
         if (over > 0)
             high = s;
         else
             low = s;
-        double next = at.v > 0 ? s - over / at.v : low - 1;
-        if (!(next > low && next < high)) {
-            /* A step of no length falls on the bracket's edge. */
-            if (fabs(next - s) <= 1e-15 * (p->t + s))
-                break;
-            next = (low + high) / 2;
-        }
-        double moved = fabs(next - s);
-        s = next;
-        if (moved <= 1e-13 * (p->t + s))
+        double step = state->v > 0 ? over / state->v : seconds, next = s - step;
+        if (fabs(step) < CLOSE) {
+            state->t -= step;
+            state->v -= step * state->a;
             break;
+        }
+        if (!(next > low && next < high)) {
+            next = 0.5 * (low + high);
+            if (next <= low || next >= high)
+                break;
+        }
+        s = next;
     }
-    return s;
+    state->x = x;
 }
 
-double ramp_time(const struct ramp *ramp, double x, double guess)
+void ramp_pass(const struct ramp *ramp, double x, double guess, struct ramp_phase *state)
 {
     int n = 0;
 
-    if (x <= ramp->phases[0].x || ramp->count == 0)
-        return ramp->phases[0].t;
-    if (x >= ramp->phases[ramp->count].x)
-        return ramp->phases[ramp->count].t;
+    if (x <= ramp->phases[0].x || ramp->count == 0) {
+        *state = ramp->phases[0];
+        return;
+    }
+    if (x >= ramp->phases[ramp->count].x) {
+        *state = ramp->phases[ramp->count];
+        return;
+    }
     while (n + 1 < ramp->count && x >= ramp->phases[n + 1].x)
         n++;
     const struct ramp_phase *p = &ramp->phases[n];
-    return p->t + solve_phase(p, ramp->phases[n + 1].t - p->t, x, guess - p->t);
+    if (p->a == 0 && p->j == 0) {
+        *state = *p;
+        state->t += (x - p->x) / p->v;
+        state->x = x;
+    } else {
+        solve_phase(p, ramp->phases[n + 1].t - p->t, x, guess - p->t, state);
+    }
+}
+
+double ramp_time(const struct ramp *ramp, double x)
+{
+    struct ramp_phase state;
+
+    ramp_pass(ramp, x, -1, &state);
+    return state.t;
 }
 
 double ramp_end_time(const struct ramp *ramp)

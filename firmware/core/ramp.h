@@ -33,9 +33,10 @@ void ramp_stop(struct ramp *ramp, double t, const struct motion_limits *limits);
 
 /* Place, speed, acceleration and jerk at time t; outside the curve those of its ends. */
 void ramp_at(const struct ramp *ramp, double t, struct ramp_phase *state);
-/* The time at which place x is reached, to the precision of a double; outside the curve that of its ends. `guess` is
- * where to start looking, a time (below 0: no idea). */
-double ramp_time(const struct ramp *ramp, double x, double guess);
+/* The time at which place x is reached, to far below a tick; outside the curve that of its ends. */
+double ramp_time(const struct ramp *ramp, double x);
+/* The state there; `guess` is a time near it. */
+void ramp_pass(const struct ramp *ramp, double x, double guess, struct ramp_phase *state);
 
 double ramp_end_time(const struct ramp *ramp);
 double ramp_end_place(const struct ramp *ramp);

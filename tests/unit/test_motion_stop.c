@@ -24,7 +24,7 @@ static void a_stop_in_any_phase_keeps_the_limits_and_the_position(void **state)
         uint64_t when = rig->motion.origin + (uint64_t)(end * uniform() * BOARD_TICK_HZ);
         step_board_run(&rig->board, when, period);
         struct ramp_phase at;
-        ramp_at(&rig->motion.ramp, motion_moving(&rig->motion) ? rig->motion.at_last.t : end, &at);
+        ramp_at(&rig->motion.ramp, motion_moving(&rig->motion) ? rig->motion.at_last.curve.t : end, &at);
         double bound = fmin(at.x + stop_distance(at.v, at.a, &l) + 1, (double)distance);
         motion_stop(&rig->motion);
         motion_stop(&rig->motion);
