@@ -1,47 +1,7 @@
 /* The port as the core sees it, and the main loop. */
-#if __has_include("firmware/core/core_state.h")
-#include "firmware/core/core_state.h"
-#else /* until firmware/core is there: what comes in goes out */
-#include "firmware/core/core.h"
-struct core {
-    const struct board *board;
-};
-void core_init(struct core *core, const struct board *board)
-{
-    core->board = board;
-}
-void core_poll(struct core *core)
-{
-    uint8_t data[64];
-    core->board->watchdog_kick(NULL);
-    for (int link = 0; link < BOARD_LINKS; link++)
-        core->board->link_write(NULL, link, data, core->board->link_read(NULL, link, data, sizeof data));
-}
-uint64_t core_next_poll(const struct core *core)
-{
-    (void)core;
-    return BOARD_NEVER;
-}
-uint32_t core_on_step(struct core *core, uint64_t at)
-{
-    (void)core, (void)at;
-    return 0;
-}
-void core_on_trigger(struct core *core, uint64_t at)
-{
-    (void)core, (void)at;
-}
-void core_on_input(struct core *core, enum board_input input, bool active, uint64_t at)
-{
-    (void)core, (void)input, (void)active, (void)at;
-}
-void core_on_feedback(struct core *core, int input, bool active, uint64_t at)
-{
-    (void)core, (void)input, (void)active, (void)at;
-}
-#endif
-#include "firmware/stm32f405/cortex.h"
 #include "firmware/stm32f405/port.h"
+#include "firmware/core/core_state.h"
+#include "firmware/stm32f405/cortex.h"
 
 static struct core core;
 struct core *const the_core = &core;
