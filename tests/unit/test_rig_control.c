@@ -232,6 +232,7 @@ static void cannot(const struct lumi_rig *rig, const char *reason)
     if (code != LUMI_ERR_FORMAT || !strstr(error.text, reason))
         fail_msg("wanted '%s', got %d: %s", reason, code, error.text);
     assert_null(strchr(error.text, '\n'));
+    assert_true(strlen(error.text) < 160); /* what a reply of the board holds */
 }
 
 #define WITH(change, reason)                                                                                           \
