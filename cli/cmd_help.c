@@ -14,7 +14,7 @@ static void list(void)
         "usage: lumi COMMAND [options] [arguments]\n\nPanoramic light fields: from a folder of photographs to any view "
         "of the place.\n\ncommands:");
     for (int i = 0; cli_commands[i]; i++)
-        printf("  %-14s %s\n", cli_commands[i]->name, cli_commands[i]->summary);
+        printf("  %-19s %s\n", cli_commands[i]->name, cli_commands[i]->summary);
     puts(
         "\n'lumi help COMMAND' tells more. Exit status: 0 done, 1 the work failed, 2 the command line was wrong, 3 the "
         "input was bad.");
@@ -72,6 +72,6 @@ const struct cli_command cli_help = {
     .arguments = "[COMMAND]",
     .summary = "list the commands, or explain one",
     .options = options,
-    .max_arguments = 2,
+    .max_arguments = 3,
     .run = run_help,
 };

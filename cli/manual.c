@@ -149,9 +149,7 @@ char *cli_manual_page(const struct cli_command *command)
 /* The options of one command, as bash's case branch. */
 static void put_case(GString *script, const struct cli_command *command)
 {
-    /* what is matched is the first two words */
-    bool two = strchr(command->name, ' ');
-    g_string_append_printf(script, two ? "    '%s') options='--help" : "    '%s '*) options='--help", command->name);
+    g_string_append_printf(script, "    '%s '*) options='--help", command->name);
     for (const GOptionEntry *option = command->options; option && option->long_name; option++) {
         if (!shown(option))
             continue;
@@ -162,22 +160,48 @@ static void put_case(GString *script, const struct cli_command *command)
     g_string_append(script, "' ;;\n");
 }
 
-/* The distinct first words of the commands' names or, given one, the words that may follow it. */
-static char *words_after(const char *first)
+/* The distinct words that may follow `before` ("" or words that each end with a blank) in the commands' names. */
+static char *words_after(const char *before)
 {
     GString *words = g_string_new(NULL);
     g_autofree char *last = NULL;
 
     for (int i = 0; cli_commands[i]; i++) {
-        g_auto(GStrv) parts = g_strsplit(cli_commands[i]->name, " ", 2);
-        const char *word = first ? parts[1] : parts[0];
-        if (!word || (first && strcmp(first, parts[0])) || (last && !strcmp(last, word)))
+        const char *name = cli_commands[i]->name;
+        if (!g_str_has_prefix(name, before))
+            continue;
+        g_autofree char *word = g_strndup(name + strlen(before), strcspn(name + strlen(before), " "));
+        if (last && !strcmp(last, word))
             continue;
         g_string_append_printf(words, "%s%s", words->len ? " " : "", word);
         g_free(last);
-        last = g_strdup(word);
+        last = g_steal_pointer(&word);
     }
     return g_string_free(words, FALSE);
+}
+
+/* What follows each beginning of `words` words of a command's name, as branches of a case. */
+static void put_following(GString *script, int words)
+{
+    g_autofree char *last = NULL;
+
+    for (int i = 0; cli_commands[i]; i++) {
+        const char *end = cli_commands[i]->name;
+        for (int w = 0; w < words && end; w++) {
+            end = strchr(end, ' ');
+            end = end ? end + 1 : NULL;
+        }
+        if (!end)
+            continue;
+        g_autofree char *before = g_strndup(cli_commands[i]->name, (gsize)(end - cli_commands[i]->name));
+        if (last && !strcmp(last, before))
+            continue;
+        g_autofree char *following = words_after(before);
+        g_string_append_printf(script, "        '%s') COMPREPLY=($(compgen -W '%s' -- \"$word\")); return ;;\n", before,
+                               following);
+        g_free(last);
+        last = g_steal_pointer(&before);
+    }
 }
 
 char *cli_manual_completion_bash(void)
@@ -188,22 +212,20 @@ char *cli_manual_completion_bash(void)
                                    "    COMPREPLY=()\n"
                                    "    [ \"${COMP_WORDS[1]}\" = help ] && [ \"$COMP_CWORD\" -gt 1 ] && at=2\n"
                                    "    if [ \"$COMP_CWORD\" -eq \"$at\" ] && [[ $word != -* ]]; then\n");
-    g_autofree char *names = words_after(NULL);
-    g_auto(GStrv) firsts = g_strsplit(names, " ", -1);
+    g_autofree char *names = words_after("");
 
     g_string_append_printf(script, "        COMPREPLY=($(compgen -W '%s' -- \"$word\"))\n        return\n    fi\n",
                            names);
-    g_string_append(script, "    if [ \"$COMP_CWORD\" -eq $((at + 1)) ]; then\n"
-                            "        case ${COMP_WORDS[at]} in\n");
-    for (int i = 0; firsts[i]; i++) {
-        g_autofree char *seconds = words_after(firsts[i]);
-        if (seconds[0])
-            g_string_append_printf(script, "        %s) COMPREPLY=($(compgen -W '%s' -- \"$word\")); return ;;\n",
-                                   firsts[i], seconds);
+    for (int words = 1; words <= 2; words++) {
+        g_string_append_printf(script,
+                               "    if [ \"$COMP_CWORD\" -eq $((at + %d)) ]; then\n"
+                               "        case \"${COMP_WORDS[*]:at:%d} \" in\n",
+                               words, words);
+        put_following(script, words);
+        g_string_append(script, "        esac\n    fi\n");
     }
-    g_string_append(script, "        esac\n    fi\n"
-                            "    [[ $word == -* ]] || return\n"
-                            "    case \"${COMP_WORDS[1]} ${COMP_WORDS[2]}\" in\n");
+    g_string_append(script, "    [[ $word == -* ]] || return\n"
+                            "    case \"${COMP_WORDS[*]:1} \" in\n");
     for (int i = 0; cli_commands[i]; i++)
         put_case(script, cli_commands[i]);
     g_string_append(script, "    esac\n"

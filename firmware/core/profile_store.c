@@ -4,11 +4,13 @@
 
 #include "proto/base/bytes.h"
 
+#include <assert.h>
 #include <string.h>
 
 #define MAGIC 0x50524c4cu /* "LLRP" */
 #define HEADER 32u
 #define DATA_MAX (BOARD_PROFILE_SLOT_SIZE - HEADER)
+static_assert(LUMI_WIRE_PROFILE_MAX <= DATA_MAX, "a profile fits a slot");
 #define WORD_OF(bytes, index) word_at((bytes) + 4 * (index))
 
 enum { MAGIC_WORD, FORMAT_WORD, SEQUENCE_WORD, SIZE_WORD, CHECKSUM_WORD };
@@ -30,18 +32,21 @@ static uint32_t checksum(const uint8_t *header, const uint8_t *data, size_t size
     return lumi_crc32c(lumi_crc32c(0, header + 4 * FORMAT_WORD, 4 * (CHECKSUM_WORD - FORMAT_WORD)), data, size);
 }
 
-/* Whether the slot holds a whole copy; `header` is what was read of it. With `data` (of `room` bytes) its data goes
- * there; where it does not fit it is no copy of this firmware's, whatever its checksum. */
-static bool read_slot(const struct board *board, int slot, uint8_t header[HEADER], uint8_t *data, size_t room)
+/* Whether the slot holds a whole copy; `header` is what was read of it. With `data` (LUMI_WIRE_PROFILE_MAX bytes) its
+ * data goes there. A copy of this format that is bigger than any profile is none, whatever its checksum, and the last
+ * sequence is none that one could be written after. */
+static bool read_slot(const struct board *board, int slot, uint8_t header[HEADER], uint8_t *data)
 {
     const uint8_t *flash = board->flash_map(board->port, slot);
 
     memcpy(header, flash, HEADER);
     uint32_t size = WORD_OF(header, SIZE_WORD);
-    if (WORD_OF(header, MAGIC_WORD) != MAGIC || size == 0 || size > DATA_MAX)
+    uint32_t most = WORD_OF(header, FORMAT_WORD) > PROFILE_STORE_FORMAT ? DATA_MAX : LUMI_WIRE_PROFILE_MAX;
+    if (WORD_OF(header, MAGIC_WORD) != MAGIC || WORD_OF(header, SEQUENCE_WORD) == UINT32_MAX || size == 0 ||
+        size > most)
         return false;
     if (data) {
-        if (size > room)
+        if (size > LUMI_WIRE_PROFILE_MAX)
             return false;
         memcpy(data, flash + HEADER, size);
     }
@@ -55,7 +60,7 @@ static int newest(const struct board *board, uint8_t header[HEADER])
     int best = -1;
 
     for (int slot = 0; slot < BOARD_PROFILE_SLOTS; slot++)
-        if (read_slot(board, slot, found, NULL, 0) &&
+        if (read_slot(board, slot, found, NULL) &&
             (best < 0 || WORD_OF(found, SEQUENCE_WORD) > WORD_OF(header, SEQUENCE_WORD))) {
             memcpy(header, found, HEADER);
             best = slot;
@@ -75,9 +80,9 @@ int profile_store_load(const struct board *board, struct profile_store_scratch *
         return lumi_fail(error, LUMI_ERR_VERSION, "the stored profile is of format %u, this firmware knows %d",
                          (unsigned)WORD_OF(header, FORMAT_WORD), PROFILE_STORE_FORMAT);
     /* Once more, into memory: a copy that reads differently now is as good as none, and the other one counts. */
-    if (!read_slot(board, slot, header, scratch->data, sizeof scratch->data)) {
+    if (!read_slot(board, slot, header, scratch->data)) {
         slot = (slot + 1) % BOARD_PROFILE_SLOTS;
-        if (!read_slot(board, slot, header, scratch->data, sizeof scratch->data))
+        if (!read_slot(board, slot, header, scratch->data) || WORD_OF(header, FORMAT_WORD) > PROFILE_STORE_FORMAT)
             return lumi_fail(error, LUMI_ERR_NOTFOUND, "no profile is stored");
     }
     uint32_t size = WORD_OF(header, SIZE_WORD);
@@ -116,9 +121,9 @@ int profile_store_save(const struct board *board, const uint8_t *data, size_t si
     uint32_t sequence = 1;
     int slot = 0, used;
 
-    if (size == 0 || size > DATA_MAX)
-        return lumi_fail(error, LUMI_ERR_LIMIT, "a profile of %u bytes, a slot takes %u", (unsigned)size,
-                         (unsigned)DATA_MAX);
+    if (size == 0 || size > LUMI_WIRE_PROFILE_MAX)
+        return lumi_fail(error, LUMI_ERR_LIMIT, "a profile of %u bytes, at most %u are kept", (unsigned)size,
+                         (unsigned)LUMI_WIRE_PROFILE_MAX);
     used = newest(board, header);
     if (used >= 0) {
         if (WORD_OF(header, FORMAT_WORD) > PROFILE_STORE_FORMAT && !replace_newer)
@@ -142,7 +147,7 @@ int profile_store_save(const struct board *board, const uint8_t *data, size_t si
         !board->flash_write(board->port, slot, 0, header, 4))
         return lumi_fail(error, LUMI_ERR_IO, "the flash did not take the profile");
     const uint8_t *flash = board->flash_map(board->port, slot);
-    if (!read_slot(board, slot, back, NULL, 0) || memcmp(back, header, HEADER) != 0 ||
+    if (!read_slot(board, slot, back, NULL) || memcmp(back, header, HEADER) != 0 ||
         memcmp(flash + HEADER, data, size) != 0)
         return lumi_fail(error, LUMI_ERR_IO, "the profile reads back from flash differently");
     return LUMI_OK;

@@ -36,7 +36,7 @@ const uint8_t *profile_store_data(const struct board *board, const struct profil
 
 /* Stores `size` bytes of an encoded profile that the caller has decoded and checked. Erases and writes flash: only at
  * rest. LUMI_ERR_IO: the flash refused or reads back differently, the old profile still counts. LUMI_ERR_VERSION: a
- * newer firmware's profile is there and `replace_newer` is false. LUMI_ERR_LIMIT: too big for a slot. */
+ * newer firmware's profile is there and `replace_newer` is false. LUMI_ERR_LIMIT: bigger than a profile can be. */
 int profile_store_save(const struct board *board, const uint8_t *data, size_t size, bool replace_newer,
                        struct lumi_error *error);
 

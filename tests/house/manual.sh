@@ -34,6 +34,7 @@ while read -r name; do
     complete_line lumi "$1" >offered.txt
     complete_line lumi "" | grep -qx -e "$1" || fail "completion does not offer $1"
     [ $# -lt 2 ] || complete_line lumi "$1" "" | grep -qx -e "$2" || fail "completion does not offer $name"
+    [ $# -lt 3 ] || complete_line lumi "$1" "$2" "" | grep -qx -e "$3" || fail "completion does not offer $name"
     complete_line lumi "$@" - >offered.txt
     # shellcheck disable=SC2086
     for option in $("$lumi" help $name | grep -oE '^  (-., )?--[a-z0-9-]+' | sed 's/.* //'); do
