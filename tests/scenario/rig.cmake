@@ -1,0 +1,1 @@
+lumi_test(rig_sweeps FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
