@@ -6,6 +6,7 @@
 #include <math.h>
 
 enum { CHANNEL_JITTER = 31, CHANNEL_PHASE = 32 };
+#define BUSY_SHARE 0.95    /* what a camera takes of the busy time its profile grants it */
 #define UNFOCUSED_LAG 0.25 /* s, that a camera takes to focus when nobody held its focus line before */
 
 static double jitter(const struct sim_mechanics *m, int camera, uint32_t n)
@@ -49,7 +50,8 @@ static void trigger(struct sim_mechanics *m, int index)
         camera->begin = record.begin = m->now + TICKS(lag_of(m, index));
         camera->end = record.end = record.begin + TICKS(seconds);
         camera->middle = record.begin + (record.end - record.begin) / 2;
-        camera->busy_until = record.end + TICKS(m->truth.control.triggers[index].busy + camera->fault.busy);
+        camera->busy_until =
+            record.end + TICKS(BUSY_SHARE * m->truth.control.triggers[index].busy + camera->fault.busy);
         camera->record = (int)m->records->len;
         camera->stage = 1;
         camera->next = camera->begin;
