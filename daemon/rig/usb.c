@@ -157,9 +157,11 @@ static void recover(struct usb_pipes *pipes)
 static void work(struct usb_stream *self)
 {
     struct timeval now = {0, 0};
+    int failed = libusb_handle_events_timeout_completed(self->context, &now, NULL);
 
-    libusb_handle_events_timeout_completed(self->context, &now, NULL);
     if (self->pipes) {
+        if (failed == LIBUSB_ERROR_NO_DEVICE)
+            self->pipes->gone = true;
         recover(self->pipes);
         feed(self->pipes);
     }

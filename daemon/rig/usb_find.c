@@ -65,10 +65,8 @@ static int open_board(libusb_device *device, libusb_device_handle **handle, stru
 
 static int claim(libusb_device_handle *handle, const struct lumi_rig_usb_board *board, struct lumi_error *error)
 {
-    int failed;
+    int failed = libusb_claim_interface(handle, LUMI_WIRE_USB_INTERFACE);
 
-    libusb_set_auto_detach_kernel_driver(handle, 1);
-    failed = libusb_claim_interface(handle, LUMI_WIRE_USB_INTERFACE);
     if (failed == LIBUSB_ERROR_BUSY)
         return lumi_fail(error, LUMI_ERR_BUSY, "usb:%s: another program has it", board->serial);
     if (failed)
@@ -80,7 +78,7 @@ static int claim(libusb_device_handle *handle, const struct lumi_rig_usb_board *
 struct search {
     libusb_device_handle *handle; /* the first that fits */
     struct lumi_rig_usb_board board;
-    GString *all; /* what was found, for messages */
+    GPtrArray *all; /* addresses of what was found, for messages */
     char refused[512];
     int fitting, boards;
 };
@@ -97,7 +95,7 @@ static void consider(struct search *search, libusb_device *device, const char *s
         snprintf(search->refused, sizeof search->refused, "%s", board.text);
         return;
     }
-    g_string_append_printf(search->all, "%susb:%s", search->all->len ? ", " : "", board.serial);
+    g_ptr_array_add(search->all, g_strdup_printf("usb:%s", board.serial));
     if ((!serial[0] || !strcmp(serial, board.serial)) && !search->fitting++) {
         search->handle = handle;
         search->board = board;
@@ -106,24 +104,33 @@ static void consider(struct search *search, libusb_device *device, const char *s
     libusb_close(handle);
 }
 
+static int by_text(const void *a, const void *b)
+{
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
 static int conclude(struct search *search, const char *serial, struct lumi_error *error)
 {
+    g_autofree char *all = NULL;
+
+    g_ptr_array_sort(search->all, by_text);
+    g_ptr_array_add(search->all, NULL);
+    all = g_strjoinv(", ", (char **)search->all->pdata);
     if (search->fitting == 1)
         return claim(search->handle, &search->board, error);
     if (search->fitting > 1)
-        return lumi_fail(error, LUMI_ERR_ARG, "there are %d boards on USB: say which of %s", search->fitting,
-                         search->all->str);
+        return lumi_fail(error, LUMI_ERR_ARG, "there are %d boards on USB: say which of %s", search->fitting, all);
     if (search->refused[0])
         return lumi_fail(error, LUMI_ERR_IO, "usb:%s: %s", serial, search->refused);
     if (search->boards)
-        return lumi_fail(error, LUMI_ERR_NOTFOUND, "usb:%s: no such board; there is %s", serial, search->all->str);
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "usb:%s: no such board; there is %s", serial, all);
     return lumi_fail(error, LUMI_ERR_NOTFOUND, "no board on USB");
 }
 
 int lumi_rig_usb_find(libusb_context *context, const char *serial, libusb_device_handle **handle, char *found,
                       struct lumi_error *error)
 {
-    struct search search = {.all = g_string_new(NULL)};
+    struct search search = {.all = g_ptr_array_new_with_free_func(g_free)};
     libusb_device **devices;
     ssize_t count = libusb_get_device_list(context, &devices);
     int code;
@@ -140,7 +147,7 @@ int lumi_rig_usb_find(libusb_context *context, const char *serial, libusb_device
     } else if (search.handle) {
         libusb_close(search.handle);
     }
-    g_string_free(search.all, TRUE);
+    g_ptr_array_free(search.all, TRUE);
     return code;
 }
 
