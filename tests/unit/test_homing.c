@@ -1,6 +1,5 @@
 /* firmware/core: homing: the mark is found to the step, from anywhere, or it is said why not. */
 #include "firmware/core/homing_state.h"
-#include "firmware/core/index_watch.h"
 #include "proto/mechanism/kinematics.h"
 #include "step_board.h"
 
@@ -359,67 +358,6 @@ static void cancelling_it_slows_down_and_forgets(void **state)
     plant_free(p);
 }
 
-static void index_marks_are_right_early_or_missed(void **state)
-{
-    struct plant *p = plant_new("bar2", 0);
-    struct index_watch watch;
-    int64_t w = 80; /* 1° of 28,800 steps */
-
-    (void)state;
-    index_watch_begin(&watch, &p->rig, -700);
-    assert_int_equal(index_watch_position(&watch, -100), INDEX_OK);
-    assert_int_equal(index_watch_edge(&watch, 3), INDEX_OK);
-    assert_int_equal(index_watch_position(&watch, 28800 + w), INDEX_OK);
-    assert_int_equal(index_watch_edge(&watch, 28800 + w), INDEX_OK);
-    assert_int_equal(index_watch_position(&watch, 28800 + w + 1), INDEX_OK);
-    assert_int_equal(index_watch_edge(&watch, 2 * 28800 - w - 1), INDEX_EARLY);
-    assert_int_equal(index_watch_edge(&watch, 2 * 28800 - w), INDEX_OK);
-    assert_int_equal(index_watch_edge(&watch, 2 * 28800 + w + 1), INDEX_EARLY);
-    assert_int_equal(index_watch_position(&watch, 3 * 28800 + w), INDEX_OK);
-    assert_int_equal(index_watch_position(&watch, 3 * 28800 + w + 1), INDEX_MISSED);
-    assert_int_equal(index_watch_position(&watch, 3 * 28800 + w + 2), INDEX_OK); /* said once */
-    assert_int_equal(index_watch_position(&watch, 5 * 28800 + w + 1), INDEX_MISSED);
-    assert_int_equal(index_watch_position(&watch, 5 * 28800 + w + 1), INDEX_MISSED);
-    assert_int_equal(index_watch_position(&watch, 5 * 28800 + w + 1), INDEX_OK);
-    /* Begun within a window: that mark may come or not. */
-    index_watch_begin(&watch, &p->rig, -w + 1);
-    assert_int_equal(index_watch_position(&watch, 2 * w), INDEX_OK);
-    assert_int_equal(index_watch_position(&watch, 28800 + w + 1), INDEX_MISSED);
-    index_watch_begin(&watch, &p->rig, w - 1);
-    assert_int_equal(index_watch_edge(&watch, w), INDEX_OK);
-    assert_int_equal(index_watch_edge(&watch, w + 1), INDEX_EARLY);
-    assert_int_equal(index_watch_position(&watch, 28800 + w), INDEX_OK);
-    /* No window: not watched. */
-    p->rig.control.motion.index_window = 0;
-    index_watch_begin(&watch, &p->rig, 0);
-    assert_int_equal(index_watch_edge(&watch, 1234), INDEX_OK);
-    assert_int_equal(index_watch_position(&watch, 100000), INDEX_OK);
-    plant_free(p);
-}
-
-static void a_spike_is_no_edge_and_an_edge_is_dated_to_the_first_contact(void **state)
-{
-    struct debounce d;
-    struct debounce_edge edge;
-
-    (void)state;
-    debounce_init(&d, false);
-    debounce_input(&d, true, 10, 1000);
-    debounce_input(&d, false, 10, 1000 + DEBOUNCE_TICKS / 2);
-    assert_false(debounce_poll(&d, 1000 + 2 * DEBOUNCE_TICKS, &edge));
-    assert_false(d.settled);
-    debounce_input(&d, true, 20, 5 * DEBOUNCE_TICKS);
-    debounce_input(&d, false, 21, 6 * DEBOUNCE_TICKS - 2);
-    debounce_input(&d, true, 22, 6 * DEBOUNCE_TICKS);
-    debounce_input(&d, true, 23, 7 * DEBOUNCE_TICKS - 1);
-    assert_false(debounce_poll(&d, 7 * DEBOUNCE_TICKS - 1, &edge));
-    assert_true(debounce_poll(&d, 7 * DEBOUNCE_TICKS, &edge));
-    assert_true(edge.active && d.settled);
-    assert_int_equal(edge.position, 20);
-    assert_int_equal(edge.at, 5 * DEBOUNCE_TICKS);
-    assert_false(debounce_poll(&d, 20 * DEBOUNCE_TICKS, &edge));
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -433,8 +371,6 @@ int main(void)
         cmocka_unit_test(a_string_that_stays_slack_fails_it),
         cmocka_unit_test(a_halt_ends_it_and_nothing_is_known),
         cmocka_unit_test(cancelling_it_slows_down_and_forgets),
-        cmocka_unit_test(index_marks_are_right_early_or_missed),
-        cmocka_unit_test(a_spike_is_no_edge_and_an_edge_is_dated_to_the_first_contact),
     };
 
     return cmocka_run_group_tests_name("homing", tests, NULL, NULL);
