@@ -9,7 +9,7 @@
 
 #define SYSTEM_MEMORY 0x1FFF0000u
 #define SYSTEM_SIZE 0x8000u
-#define UNIQUE_ID 0x7A10u /* RM0090 39.1 */
+#define UNIQUE_ID 0x7A10u       /* RM0090 39.1 */
 #define FLASH_KILOBYTES 0x7A22u /* RM0090 39.2 */
 #define PERIPHERALS 0x40000000u
 #define PERIPHERALS_SIZE 0x100000u
@@ -21,31 +21,31 @@
 /* RM0090 table 1 (boundary addresses) and 7.3.10 to 7.3.14 (clock enable bits). */
 static const struct peripheral {
     uint32_t base, size;
-    peripheral_access *access;
+    f405_peripheral_access *access;
     int index;
     uint8_t enable, bit; /* RCC offset (0: always clocked) and bit */
 } peripherals[] = {
-    {0x40000000, 0x400, timer_access, 2, 0x40, 0},    {0x40000400, 0x400, timer_access, 3, 0x40, 1},
-    {0x40000800, 0x400, timer_access, 4, 0x40, 2},    {0x40000C00, 0x400, timer_access, 5, 0x40, 3},
-    {0x40001000, 0x400, timer_access, 6, 0x40, 4},    {0x40001400, 0x400, timer_access, 7, 0x40, 5},
-    {0x40001800, 0x400, timer_access, 12, 0x40, 6},   {0x40001C00, 0x400, timer_access, 13, 0x40, 7},
-    {0x40002000, 0x400, timer_access, 14, 0x40, 8},   {0x40003000, 0x400, iwdg_access, 0, 0, 0},
-    {0x40004400, 0x400, usart_access, 2, 0x40, 17},   {0x40004800, 0x400, usart_access, 3, 0x40, 18},
-    {0x40004C00, 0x400, usart_access, 4, 0x40, 19},   {0x40005000, 0x400, usart_access, 5, 0x40, 20},
-    {0x40007000, 0x400, pwr_access, 0, 0x40, 28},     {0x40010000, 0x400, timer_access, 1, 0x44, 0},
-    {0x40010400, 0x400, timer_access, 8, 0x44, 1},    {0x40011000, 0x400, usart_access, 1, 0x44, 4},
-    {0x40011400, 0x400, usart_access, 6, 0x44, 5},    {0x40012000, 0x400, adc_access, 0, 0x44, 8},
-    {0x40013800, 0x400, syscfg_access, 0, 0x44, 14},  {0x40013C00, 0x400, exti_access, 0, 0, 0},
-    {0x40014000, 0x400, timer_access, 9, 0x44, 16},   {0x40014400, 0x400, timer_access, 10, 0x44, 17},
-    {0x40014800, 0x400, timer_access, 11, 0x44, 18},  {0x40020000, 0x400, gpio_access, 0, 0x30, 0},
-    {0x40020400, 0x400, gpio_access, 1, 0x30, 1},     {0x40020800, 0x400, gpio_access, 2, 0x30, 2},
-    {0x40020C00, 0x400, gpio_access, 3, 0x30, 3},     {0x40021000, 0x400, gpio_access, 4, 0x30, 4},
-    {0x40021400, 0x400, gpio_access, 5, 0x30, 5},     {0x40021800, 0x400, gpio_access, 6, 0x30, 6},
-    {0x40021C00, 0x400, gpio_access, 7, 0x30, 7},     {0x40022000, 0x400, gpio_access, 8, 0x30, 8},
-    {0x40023000, 0x400, crc_access, 0, 0x30, 12},     {0x40023800, 0x400, rcc_access, 0, 0, 0},
-    {0x40023C00, 0x400, flash_access, 0, 0, 0},       {0x40026000, 0x400, dma_access, 0, 0x30, 21},
-    {0x40026400, 0x400, dma_access, 1, 0x30, 22},     {0x50000000, 0x40000, otg_access, 0, 0x34, 7},
-    {0x50060800, 0x400, rng_access, 0, 0x34, 6},
+    {0x40000000, 0x400, f405_timer_access, 2, 0x40, 0},   {0x40000400, 0x400, f405_timer_access, 3, 0x40, 1},
+    {0x40000800, 0x400, f405_timer_access, 4, 0x40, 2},   {0x40000C00, 0x400, f405_timer_access, 5, 0x40, 3},
+    {0x40001000, 0x400, f405_timer_access, 6, 0x40, 4},   {0x40001400, 0x400, f405_timer_access, 7, 0x40, 5},
+    {0x40001800, 0x400, f405_timer_access, 12, 0x40, 6},  {0x40001C00, 0x400, f405_timer_access, 13, 0x40, 7},
+    {0x40002000, 0x400, f405_timer_access, 14, 0x40, 8},  {0x40003000, 0x400, f405_iwdg_access, 0, 0, 0},
+    {0x40004400, 0x400, f405_usart_access, 2, 0x40, 17},  {0x40004800, 0x400, f405_usart_access, 3, 0x40, 18},
+    {0x40004C00, 0x400, f405_usart_access, 4, 0x40, 19},  {0x40005000, 0x400, f405_usart_access, 5, 0x40, 20},
+    {0x40007000, 0x400, f405_pwr_access, 0, 0x40, 28},    {0x40010000, 0x400, f405_timer_access, 1, 0x44, 0},
+    {0x40010400, 0x400, f405_timer_access, 8, 0x44, 1},   {0x40011000, 0x400, f405_usart_access, 1, 0x44, 4},
+    {0x40011400, 0x400, f405_usart_access, 6, 0x44, 5},   {0x40012000, 0x400, f405_adc_access, 0, 0x44, 8},
+    {0x40013800, 0x400, f405_syscfg_access, 0, 0x44, 14}, {0x40013C00, 0x400, f405_exti_access, 0, 0, 0},
+    {0x40014000, 0x400, f405_timer_access, 9, 0x44, 16},  {0x40014400, 0x400, f405_timer_access, 10, 0x44, 17},
+    {0x40014800, 0x400, f405_timer_access, 11, 0x44, 18}, {0x40020000, 0x400, f405_gpio_access, 0, 0x30, 0},
+    {0x40020400, 0x400, f405_gpio_access, 1, 0x30, 1},    {0x40020800, 0x400, f405_gpio_access, 2, 0x30, 2},
+    {0x40020C00, 0x400, f405_gpio_access, 3, 0x30, 3},    {0x40021000, 0x400, f405_gpio_access, 4, 0x30, 4},
+    {0x40021400, 0x400, f405_gpio_access, 5, 0x30, 5},    {0x40021800, 0x400, f405_gpio_access, 6, 0x30, 6},
+    {0x40021C00, 0x400, f405_gpio_access, 7, 0x30, 7},    {0x40022000, 0x400, f405_gpio_access, 8, 0x30, 8},
+    {0x40023000, 0x400, f405_crc_access, 0, 0x30, 12},    {0x40023800, 0x400, f405_rcc_access, 0, 0, 0},
+    {0x40023C00, 0x400, f405_flash_access, 0, 0, 0},      {0x40026000, 0x400, f405_dma_access, 0, 0x30, 21},
+    {0x40026400, 0x400, f405_dma_access, 1, 0x30, 22},    {0x50000000, 0x40000, f405_otg_access, 0, 0x34, 7},
+    {0x50060800, 0x400, f405_rng_access, 0, 0x34, 6},
 };
 
 void f405_complain(struct f405 *chip, const char *format, ...)
@@ -79,7 +79,7 @@ bool f405_mmio(struct f405 *chip, uint32_t address, unsigned size, bool write, u
         const struct peripheral *p = &peripherals[i];
         if (address - p->base >= p->size)
             continue;
-        if (p->enable && !rcc_enabled(chip, p->enable, p->bit)) {
+        if (p->enable && !f405_rcc_enabled(chip, p->enable, p->bit)) {
             f405_complain(chip, "%s of 0x%08x: the peripheral has no clock", write ? "write" : "read", address);
             return false;
         }
@@ -132,11 +132,11 @@ void f405_bus_write(struct f405 *chip, uint32_t address, unsigned size, uint32_t
 
 static uint64_t access_memory(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t value)
 {
-    flash_fix(chip);
+    f405_flash_fix(chip);
     /* The block's time has been added already: what was due by then has happened. */
     if (chip->now >= chip->next)
         f405_run_events(chip);
-    bool ok = address >= PPB ? ppb_access(chip, address, size, write, &value)
+    bool ok = address >= PPB ? f405_ppb_access(chip, address, size, write, &value)
                              : f405_mmio(chip, address, size, write, &value);
     if (write)
         f405_schedule(chip);
@@ -167,15 +167,15 @@ static uint64_t earlier(uint64_t a, uint64_t b)
 
 void f405_schedule(struct f405 *chip)
 {
-    uint64_t next = earlier(cpu_next(chip), iwdg_next(chip));
+    uint64_t next = earlier(f405_cpu_next(chip), f405_iwdg_next(chip));
     next = earlier(next, chip->flash.done);
     next = earlier(next, chip->adc.done);
     next = earlier(next, chip->otg.reset_end);
     for (int i = 1; i < TIMERS; i++)
         if (chip->timer[i].cr1 & 1)
-            next = earlier(next, timer_next(chip, i));
+            next = earlier(next, f405_timer_next(chip, i));
     for (int i = 1; i < F405_USARTS; i++)
-        next = earlier(next, usart_next(chip, i));
+        next = earlier(next, f405_usart_next(chip, i));
     if (chip->ops->next)
         next = earlier(next, chip->ops->next(chip->context));
     chip->next = earlier(next, chip->until);
@@ -191,20 +191,20 @@ void f405_run_events(struct f405 *chip)
         chip->now = at;
         for (int i = 1; i < TIMERS; i++)
             if (chip->timer[i].cr1 & 1)
-                timer_sync(chip, i, at);
+                f405_timer_sync(chip, i, at);
         for (int i = 1; i < F405_USARTS; i++)
-            if (usart_next(chip, i) <= at)
-                usart_event(chip, i);
+            if (f405_usart_next(chip, i) <= at)
+                f405_usart_event(chip, i);
         if (chip->flash.done <= at)
-            flash_event(chip);
+            f405_flash_event(chip);
         if (chip->adc.done <= at)
-            adc_event(chip);
+            f405_adc_event(chip);
         if (chip->otg.reset_end <= at)
-            otg_event(chip);
-        if (cpu_next(chip) <= at)
-            cpu_event(chip);
-        if (iwdg_next(chip) <= at)
-            iwdg_event(chip);
+            f405_otg_event(chip);
+        if (f405_cpu_next(chip) <= at)
+            f405_cpu_event(chip);
+        if (f405_iwdg_next(chip) <= at)
+            f405_iwdg_event(chip);
         if (chip->ops->next && chip->ops->next(chip->context) <= at)
             chip->ops->event(chip->context, at);
         if (at == chip->until) /* the caller's own limit stays */
@@ -238,7 +238,7 @@ static bool wants_to_stop(struct f405 *chip)
 {
     if (chip->fault[0] || chip->reset_wanted || chip->stop || chip->now >= chip->until)
         return true;
-    return cpu_deliverable(chip);
+    return f405_cpu_deliverable(chip);
 }
 
 static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *user)
@@ -247,7 +247,7 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *use
     uint32_t address = (uint32_t)address64;
     chip->block_address = address;
     if (chip->flash.fix_size)
-        flash_fix(chip);
+        f405_flash_fix(chip);
     /* RM0090 3.5.2: a read of flash (so also the next instruction from it) waits for the end of the operation. */
     if (chip->flash.done != F405_NEVER && address - F405_FLASH < F405_FLASH_SIZE && chip->now < chip->flash.done)
         chip->now = chip->flash.done;
@@ -281,10 +281,10 @@ static bool on_invalid(uc_engine *uc, uc_mem_type type, uint64_t address, int si
     (void)uc;
     struct f405 *chip = user;
     if (type == UC_MEM_WRITE_PROT)
-        return flash_write_hook(chip, (uint32_t)address, (unsigned)size, (uint64_t)value);
-    const char *doing = type == UC_MEM_WRITE_UNMAPPED                                   ? "write"
+        return f405_flash_write_hook(chip, (uint32_t)address, (unsigned)size, (uint64_t)value);
+    const char *doing = type == UC_MEM_WRITE_UNMAPPED                                ? "write"
                         : type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT ? "fetch"
-                                                                                        : "read";
+                                                                                     : "read";
     f405_complain(chip, "%s of 0x%08llx: no memory there", doing, (unsigned long long)address);
     return false;
 }
@@ -360,7 +360,8 @@ struct f405 *f405_create(const struct f405_ops *ops, void *context)
     memcpy(chip->system + FLASH_KILOBYTES, &(uint16_t){F405_FLASH_SIZE / 1024}, 2);
     for (int i = 0x100; i < 0x200; i += 2) /* "b ." */
         memcpy(chip->system + i, &(uint16_t){0xe7fe}, 2);
-    f405_set_unique_id(chip, (const uint8_t[12]){0x1f, 0x00, 0x2c, 0x00, 0x0c, 0x51, 0x34, 0x35, 0x39, 0x34, 0x37, 0x33});
+    f405_set_unique_id(chip,
+                       (const uint8_t[12]){0x1f, 0x00, 0x2c, 0x00, 0x0c, 0x51, 0x34, 0x35, 0x39, 0x34, 0x37, 0x33});
     if (uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &chip->uc) != UC_ERR_OK ||
         uc_ctl_set_cpu_model(chip->uc, UC_CPU_ARM_CORTEX_M4) != UC_ERR_OK || !map_memory(chip) || !add_hooks(chip))
         goto fail;
@@ -391,7 +392,8 @@ void f405_set_unique_id(struct f405 *chip, const uint8_t id[12])
 
 bool f405_flash_load(struct f405 *chip, uint32_t address, const void *data, size_t size)
 {
-    if (address < F405_FLASH || address - F405_FLASH > F405_FLASH_SIZE || size > F405_FLASH_SIZE - (address - F405_FLASH))
+    if (address < F405_FLASH || address - F405_FLASH > F405_FLASH_SIZE ||
+        size > F405_FLASH_SIZE - (address - F405_FLASH))
         return false;
     memcpy(chip->flash_bytes + (address - F405_FLASH), data, size);
     /* Unicorn 2.1 renamed the macro; what it stands for stayed. */
@@ -406,21 +408,21 @@ static void reset(struct f405 *chip, uint32_t flags)
 {
     chip->reset_wanted = false;
     chip->resets++;
-    rcc_reset(chip, flags);
+    f405_rcc_reset(chip, flags);
     memset(chip->timer, 0, sizeof chip->timer);
-    timer_reset(chip);
+    f405_timer_reset(chip);
     memset(chip->dma, 0, sizeof chip->dma);
-    usart_reset(chip);
+    f405_usart_reset(chip);
     chip->adc = (struct adc){.done = F405_NEVER};
     chip->watchdog = (struct watchdog){.rlr = 0xfff};
     chip->exti = (struct exti){0};
-    flash_reset(chip);
-    otg_reset(chip);
-    gpio_reset(chip);
+    f405_flash_reset(chip);
+    f405_otg_reset(chip);
+    f405_gpio_reset(chip);
     chip->rng_cr = 0;
     chip->crc = 0xffffffffu;
     chip->pwr_cr = 1u << 14; /* RM0090 5.4.1: VOS = scale 1 */
-    cpu_reset(chip);
+    f405_cpu_reset(chip);
     chip->attention = true;
 }
 
@@ -437,10 +439,10 @@ void f405_power(struct f405 *chip, bool on)
         return;
     chip->on = on;
     if (!on) {
-        flash_power_cut(chip);
+        f405_flash_power_cut(chip);
         memset(chip->timer, 0, sizeof chip->timer);
-        gpio_reset(chip);
-        otg_reset(chip);
+        f405_gpio_reset(chip);
+        f405_otg_reset(chip);
         return;
     }
     for (uint32_t i = 0; i < RAM_SIZE; i += 4)
@@ -455,7 +457,7 @@ void f405_reset_pin(struct f405 *chip)
 
 static void sleep_ahead(struct f405 *chip)
 {
-    if (cpu_deliverable(chip) || chip->cpu.event) {
+    if (f405_cpu_deliverable(chip) || chip->cpu.event) {
         chip->cpu.asleep = chip->cpu.event = false;
         return;
     }
@@ -463,7 +465,7 @@ static void sleep_ahead(struct f405 *chip)
     if (chip->next > chip->now)
         chip->now = chip->next;
     f405_run_events(chip);
-    if (cpu_wakes(chip))
+    if (f405_cpu_wakes(chip))
         chip->cpu.asleep = false;
 }
 
@@ -474,7 +476,7 @@ static void run_core(struct f405 *chip)
     chip->hook_stopped = false;
     chip->attention = true;
     uc_err e = uc_emu_start(chip->uc, pc | 1, 0xfffffffeu, 0, 0);
-    flash_fix(chip);
+    f405_flash_fix(chip);
     if (e != UC_ERR_OK && !chip->cpu.exception_return)
         f405_complain(chip, "the core stopped: %s", uc_strerror(e));
     if (chip->hook_stopped || chip->fault[0])
@@ -485,7 +487,7 @@ static void run_core(struct f405 *chip)
     if (instruction == 0xbf30 || instruction == 0xbf20) { /* WFI, WFE */
         chip->cpu.asleep = instruction == 0xbf30 || !chip->cpu.event;
         chip->cpu.event = false;
-        if (cpu_wakes(chip))
+        if (f405_cpu_wakes(chip))
             chip->cpu.asleep = false;
     }
 }
@@ -513,9 +515,9 @@ enum f405_stop f405_run(struct f405 *chip, uint64_t until)
             continue;
         }
         if (chip->cpu.exception_return)
-            cpu_return(chip);
-        if (cpu_deliverable(chip))
-            cpu_enter(chip);
+            f405_cpu_return(chip);
+        if (f405_cpu_deliverable(chip))
+            f405_cpu_enter(chip);
         run_core(chip);
     }
     return chip->reason;

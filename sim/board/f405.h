@@ -22,8 +22,8 @@
 #define F405_PINS 144
 #define F405_FLASH 0x08000000u
 #define F405_FLASH_SIZE 0x100000u
-#define F405_USARTS 7       /* 1 .. 6; 0 is none */
-#define F405_EXCEPTIONS 98  /* 16 of the core, 82 of the chip (RM0090 table 61) */
+#define F405_USARTS 7      /* 1 .. 6; 0 is none */
+#define F405_EXCEPTIONS 98 /* 16 of the core, 82 of the chip (RM0090 table 61) */
 
 struct f405;
 
@@ -92,7 +92,7 @@ void f405_uart_break(struct f405 *chip, int usart);
 enum f405_usb_answer { F405_USB_NONE = -1, F405_USB_ACK = 0, F405_USB_NAK, F405_USB_STALL };
 bool f405_usb_attached(const struct f405 *chip); /* the device pulls D+ up */
 void f405_usb_vbus(struct f405 *chip, bool on);
-void f405_usb_reset(struct f405 *chip, bool begin); /* SE0 begins or ends */
+void f405_usb_reset(struct f405 *chip, bool begin);   /* SE0 begins or ends */
 void f405_usb_suspend(struct f405 *chip, bool begin); /* the bus is idle for 3 ms; activity */
 void f405_usb_sof(struct f405 *chip, unsigned frame);
 enum f405_usb_answer f405_usb_setup(struct f405 *chip, int address, int endpoint, const uint8_t setup[8]);

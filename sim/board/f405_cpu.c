@@ -21,7 +21,7 @@ static void set(struct f405 *chip, int reg, uint32_t value)
     uc_reg_write(chip->uc, reg, &value);
 }
 
-void cpu_reset(struct f405 *chip)
+void f405_cpu_reset(struct f405 *chip)
 {
     struct f405_exception_stats stats[F405_EXCEPTIONS];
     memcpy(stats, chip->cpu.stats, sizeof stats);
@@ -29,10 +29,9 @@ void cpu_reset(struct f405 *chip)
     memcpy(chip->cpu.stats, stats, sizeof stats);
     for (int i = 1; i < EX_IRQ; i++)
         chip->cpu.enabled[i] = true;
-    static const int general[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2,  UC_ARM_REG_R3,
-                                  UC_ARM_REG_R4,  UC_ARM_REG_R5, UC_ARM_REG_R6,  UC_ARM_REG_R7,
-                                  UC_ARM_REG_R8,  UC_ARM_REG_R9, UC_ARM_REG_R10, UC_ARM_REG_R11,
-                                  UC_ARM_REG_R12, UC_ARM_REG_LR};
+    static const int general[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1,  UC_ARM_REG_R2,  UC_ARM_REG_R3, UC_ARM_REG_R4,
+                                  UC_ARM_REG_R5,  UC_ARM_REG_R6,  UC_ARM_REG_R7,  UC_ARM_REG_R8, UC_ARM_REG_R9,
+                                  UC_ARM_REG_R10, UC_ARM_REG_R11, UC_ARM_REG_R12, UC_ARM_REG_LR};
     set(chip, UC_ARM_REG_IPSR, 0);
     set(chip, UC_ARM_REG_CONTROL, 0);
     set(chip, UC_ARM_REG_PRIMASK, 0);
@@ -55,7 +54,7 @@ static unsigned group_priority(const struct f405 *chip, int exception)
     return chip->cpu.priority[exception] & (0xffu << (chip->cpu.aircr_group + 1)) & 0xff;
 }
 
-void cpu_update(struct f405 *chip)
+void f405_cpu_update(struct f405 *chip)
 {
     struct cpu *cpu = &chip->cpu;
     int best = 0;
@@ -67,22 +66,22 @@ void cpu_update(struct f405 *chip)
         chip->attention = true;
 }
 
-void cpu_pend(struct f405 *chip, int exception)
+void f405_cpu_pend(struct f405 *chip, int exception)
 {
     if (!chip->cpu.pending[exception]) {
         chip->cpu.pending[exception] = true;
         chip->cpu.pended[exception] = chip->now;
     }
-    cpu_update(chip);
+    f405_cpu_update(chip);
 }
 
-void cpu_irq(struct f405 *chip, int irq, bool level)
+void f405_cpu_irq(struct f405 *chip, int irq, bool level)
 {
     bool *line = &chip->cpu.line[EX_IRQ + irq];
     bool rises = level && !*line;
     *line = level;
     if (rises)
-        cpu_pend(chip, EX_IRQ + irq);
+        f405_cpu_pend(chip, EX_IRQ + irq);
 }
 
 static unsigned running_priority(const struct f405 *chip)
@@ -95,7 +94,7 @@ static unsigned running_priority(const struct f405 *chip)
     return lowest;
 }
 
-bool cpu_deliverable(struct f405 *chip)
+bool f405_cpu_deliverable(struct f405 *chip)
 {
     int candidate = chip->cpu.candidate;
     if (!candidate || chip->cpu.exception_return)
@@ -111,7 +110,7 @@ bool cpu_deliverable(struct f405 *chip)
 }
 
 /* DDI0403E B1.5.19: WFI ends for what would be taken if PRIMASK were clear. */
-bool cpu_wakes(const struct f405 *chip)
+bool f405_cpu_wakes(const struct f405 *chip)
 {
     const struct cpu *cpu = &chip->cpu;
     if (!cpu->candidate || group_priority(chip, cpu->candidate) >= running_priority(chip))
@@ -126,7 +125,7 @@ bool cpu_wakes(const struct f405 *chip)
 static const int stacked[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
                               UC_ARM_REG_R12, UC_ARM_REG_LR, UC_ARM_REG_PC};
 
-void cpu_enter(struct f405 *chip)
+void f405_cpu_enter(struct f405 *chip)
 {
     struct cpu *cpu = &chip->cpu;
     int exception = cpu->candidate;
@@ -170,7 +169,7 @@ void cpu_enter(struct f405 *chip)
     stats->count++;
     if (chip->now - cpu->pended[exception] > stats->latency_max)
         stats->latency_max = chip->now - cpu->pended[exception];
-    cpu_update(chip);
+    f405_cpu_update(chip);
     if (exception == EX_HARDFAULT)
         f405_complain(chip, "a hard fault");
 }
@@ -186,11 +185,11 @@ static void leave(struct f405 *chip)
     cpu->active[exception] = false;
     /* DDI0403E B3.4.1: a level that still stands pends again. */
     if (exception >= EX_IRQ && cpu->line[exception])
-        cpu_pend(chip, exception);
-    cpu_update(chip);
+        f405_cpu_pend(chip, exception);
+    f405_cpu_update(chip);
 }
 
-void cpu_return(struct f405 *chip)
+void f405_cpu_return(struct f405 *chip)
 {
     struct cpu *cpu = &chip->cpu;
     uint32_t kind = cpu->exception_return, frame[8], fp_frame[18];
@@ -239,19 +238,19 @@ static uint64_t systick_period(const struct f405 *chip)
     return (uint64_t)chip->rcc.cost * (chip->cpu.systick_ctrl & 4 ? 1 : 8);
 }
 
-uint64_t cpu_next(const struct f405 *chip)
+uint64_t f405_cpu_next(const struct f405 *chip)
 {
     return chip->cpu.systick_next;
 }
 
-void cpu_event(struct f405 *chip)
+void f405_cpu_event(struct f405 *chip)
 {
     struct cpu *cpu = &chip->cpu;
     cpu->systick_flag = true;
     cpu->systick_next =
         cpu->systick_load ? cpu->systick_next + (cpu->systick_load + 1) * systick_period(chip) : F405_NEVER;
     if (cpu->systick_ctrl & 2)
-        cpu_pend(chip, EX_SYSTICK);
+        f405_cpu_pend(chip, EX_SYSTICK);
 }
 
 static bool systick_access(struct f405 *chip, uint32_t address, bool write, uint32_t *value)
@@ -305,17 +304,17 @@ static void nvic_bits(struct f405 *chip, bool *array, int word, bool write, bool
             break;
         if (write && *value >> i & 1) {
             if (to && array == chip->cpu.pending)
-                cpu_pend(chip, exception);
+                f405_cpu_pend(chip, exception);
             array[exception] = to;
             /* A level stands as soon as nothing holds it off. */
             if (array == chip->cpu.pending && !to && chip->cpu.line[exception] && !chip->cpu.active[exception])
-                cpu_pend(chip, exception);
+                f405_cpu_pend(chip, exception);
         }
         result |= (uint32_t)array[exception] << i;
     }
     if (!write)
         *value = result;
-    cpu_update(chip);
+    f405_cpu_update(chip);
 }
 
 static bool priorities(struct f405 *chip, int first, unsigned size, bool write, uint32_t *value)
@@ -331,7 +330,7 @@ static bool priorities(struct f405 *chip, int first, unsigned size, bool write, 
     }
     if (!write)
         *value = result;
-    cpu_update(chip);
+    f405_cpu_update(chip);
     return true;
 }
 
@@ -346,14 +345,14 @@ static bool icsr(struct f405 *chip, bool write, uint32_t *value)
         return true;
     }
     if (*value & 1u << 28)
-        cpu_pend(chip, EX_PENDSV);
+        f405_cpu_pend(chip, EX_PENDSV);
     if (*value & 1u << 27)
         cpu->pending[EX_PENDSV] = false;
     if (*value & 1u << 26)
-        cpu_pend(chip, EX_SYSTICK);
+        f405_cpu_pend(chip, EX_SYSTICK);
     if (*value & 1u << 25)
         cpu->pending[EX_SYSTICK] = false;
-    cpu_update(chip);
+    f405_cpu_update(chip);
     return true;
 }
 
@@ -457,12 +456,12 @@ static bool nvic_access(struct f405 *chip, uint32_t address, unsigned size, bool
     }
 }
 
-bool ppb_access(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t *value)
+bool f405_ppb_access(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t *value)
 {
     struct cpu *cpu = &chip->cpu;
     bool ok = false;
     if (address >= 0xE0042000 && address < 0xE0042010)
-        ok = dbgmcu_access(chip, 0, address - 0xE0042000, write, value);
+        ok = f405_dbgmcu_access(chip, 0, address - 0xE0042000, write, value);
     else if (address == 0xE0001000)
         ok = plain(&cpu->dwt_ctrl, write, value);
     else if (address == 0xE0001004) {

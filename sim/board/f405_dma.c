@@ -18,7 +18,7 @@ static void interrupts(struct f405 *chip, int dma, int stream)
     const struct dma_stream *s = &chip->dma[dma].stream[stream];
     uint32_t flags = chip->dma[dma].isr[stream / 4] >> shift_of(stream);
     bool active = (s->cr & TCIE && flags & 0x20) || (s->cr & HTIE && flags & 0x10) || (s->cr & TEIE && flags & 8);
-    cpu_irq(chip, irqs[dma][stream], active);
+    f405_cpu_irq(chip, irqs[dma][stream], active);
 }
 
 static void flag(struct f405 *chip, int dma, int stream, uint32_t bit)
@@ -37,7 +37,7 @@ static bool reachable(struct f405 *chip, int dma, uint32_t address)
     return true;
 }
 
-bool dma_request(struct f405 *chip, int dma, int stream, int channel)
+bool f405_dma_request(struct f405 *chip, int dma, int stream, int channel)
 {
     struct dma_stream *s = &chip->dma[dma].stream[stream];
     if (!(s->cr & EN) || bits(s->cr, 25, 3) != (unsigned)channel || !s->ndtr)
@@ -87,14 +87,14 @@ static void write_control(struct f405 *chip, int dma, int stream, uint32_t value
         s->reload = s->ndtr;
         s->at = 0;
         for (int i = 1; i < F405_USARTS; i++)
-            usart_pump(chip, i);
+            f405_usart_pump(chip, i);
     } else if (old & EN && !(value & EN) && s->ndtr) {
         flag(chip, dma, stream, 0x20); /* 10.3.14: stopped, TCIF tells when */
     }
     interrupts(chip, dma, stream);
 }
 
-bool dma_access(struct f405 *chip, int dma, uint32_t offset, bool write, uint32_t *value)
+bool f405_dma_access(struct f405 *chip, int dma, uint32_t offset, bool write, uint32_t *value)
 {
     struct dma *d = &chip->dma[dma];
     if (offset < 8) {

@@ -19,7 +19,7 @@ static uint32_t sector_size(int sector)
     return sector < 4 ? 0x4000 : sector == 4 ? 0x10000 : 0x20000;
 }
 
-void flash_reset(struct f405 *chip)
+void f405_flash_reset(struct f405 *chip)
 {
     uint32_t acr = chip->flash.acr;
     chip->flash = (struct flash){.cr = LOCK, .optcr = 0x0FFFAAED, .done = F405_NEVER, .sector = -1, .acr = acr};
@@ -28,7 +28,7 @@ void flash_reset(struct f405 *chip)
 static void error(struct f405 *chip, uint32_t flag)
 {
     chip->flash.sr |= flag;
-    cpu_irq(chip, FLASH_IRQ, chip->flash.cr >> 25 & 1);
+    f405_cpu_irq(chip, FLASH_IRQ, chip->flash.cr >> 25 & 1);
 }
 
 /* DS8626 table 40, typical: 400, 300, 250 ms for 16 KiB with a parallelism of 8, 16, 32 bits, and so on. */
@@ -78,7 +78,7 @@ static void write_key(struct f405 *chip, uint32_t value)
         f->cr &= ~LOCK;
 }
 
-bool flash_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_flash_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     struct flash *f = &chip->flash;
@@ -114,10 +114,10 @@ bool flash_access(struct f405 *chip, int index, uint32_t offset, bool write, uin
 }
 
 /* An instruction writes to flash: that programs it, or is an error. True: the access is allowed. */
-bool flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, uint64_t value)
+bool f405_flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, uint64_t value)
 {
     struct flash *f = &chip->flash;
-    flash_fix(chip);
+    f405_flash_fix(chip);
     if (address - F405_FLASH >= F405_FLASH_SIZE || size > 8) {
         f405_complain(chip, "write of 0x%08x: that is not to be written", address);
         return false;
@@ -154,7 +154,7 @@ bool flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, uint64
     return true;
 }
 
-void flash_fix(struct f405 *chip)
+void f405_flash_fix(struct f405 *chip)
 {
     struct flash *f = &chip->flash;
     if (!f->fix_size)
@@ -163,7 +163,7 @@ void flash_fix(struct f405 *chip)
     f->fix_size = 0;
 }
 
-void flash_event(struct f405 *chip)
+void f405_flash_event(struct f405 *chip)
 {
     struct flash *f = &chip->flash;
     f->done = F405_NEVER;
@@ -173,16 +173,16 @@ void flash_event(struct f405 *chip)
     f->size = 0;
     if (f->cr >> 24 & 1) { /* EOP is set only with EOPIE: 3.9.4 */
         f->sr |= EOP;
-        cpu_irq(chip, FLASH_IRQ, true);
+        f405_cpu_irq(chip, FLASH_IRQ, true);
         chip->cpu.line[EX_IRQ + FLASH_IRQ] = false;
     }
 }
 
 /* What an operation leaves when the power goes: bits that were on their way are either. */
-void flash_power_cut(struct f405 *chip)
+void f405_flash_power_cut(struct f405 *chip)
 {
     struct flash *f = &chip->flash;
-    flash_fix(chip);
+    f405_flash_fix(chip);
     if (f->done == F405_NEVER)
         return;
     f->done = F405_NEVER;

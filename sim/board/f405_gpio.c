@@ -7,21 +7,24 @@
 static const struct route {
     uint8_t pin, function, timer, channel;
 } routes[] = {
-#define R(port, bit, function, timer, channel) {F405_PIN(port, bit), function, timer, channel - 1}
-    R('A', 8, 1, 1, 1),   R('A', 9, 1, 1, 2),   R('A', 10, 1, 1, 3),  R('A', 11, 1, 1, 4),  R('E', 9, 1, 1, 1),
-    R('E', 11, 1, 1, 2),  R('E', 13, 1, 1, 3),  R('E', 14, 1, 1, 4),  R('A', 0, 1, 2, 1),   R('A', 5, 1, 2, 1),
-    R('A', 15, 1, 2, 1),  R('A', 1, 1, 2, 2),   R('B', 3, 1, 2, 2),   R('A', 2, 1, 2, 3),   R('B', 10, 1, 2, 3),
-    R('A', 3, 1, 2, 4),   R('B', 11, 1, 2, 4),  R('A', 6, 2, 3, 1),   R('B', 4, 2, 3, 1),   R('C', 6, 2, 3, 1),
-    R('A', 7, 2, 3, 2),   R('B', 5, 2, 3, 2),   R('C', 7, 2, 3, 2),   R('B', 0, 2, 3, 3),   R('C', 8, 2, 3, 3),
-    R('B', 1, 2, 3, 4),   R('C', 9, 2, 3, 4),   R('B', 6, 2, 4, 1),   R('D', 12, 2, 4, 1),  R('B', 7, 2, 4, 2),
-    R('D', 13, 2, 4, 2),  R('B', 8, 2, 4, 3),   R('D', 14, 2, 4, 3),  R('B', 9, 2, 4, 4),   R('D', 15, 2, 4, 4),
-    R('A', 0, 2, 5, 1),   R('H', 10, 2, 5, 1),  R('A', 1, 2, 5, 2),   R('H', 11, 2, 5, 2),  R('A', 2, 2, 5, 3),
-    R('H', 12, 2, 5, 3),  R('A', 3, 2, 5, 4),   R('I', 0, 2, 5, 4),   R('C', 6, 3, 8, 1),   R('I', 5, 3, 8, 1),
-    R('C', 7, 3, 8, 2),   R('I', 6, 3, 8, 2),   R('C', 8, 3, 8, 3),   R('I', 7, 3, 8, 3),   R('C', 9, 3, 8, 4),
-    R('I', 2, 3, 8, 4),   R('A', 2, 3, 9, 1),   R('E', 5, 3, 9, 1),   R('A', 3, 3, 9, 2),   R('E', 6, 3, 9, 2),
-    R('B', 8, 3, 10, 1),  R('F', 6, 3, 10, 1),  R('B', 9, 3, 11, 1),  R('F', 7, 3, 11, 1),  R('B', 14, 9, 12, 1),
-    R('H', 6, 9, 12, 1),  R('B', 15, 9, 12, 2), R('H', 9, 9, 12, 2),  R('A', 6, 9, 13, 1),  R('F', 8, 9, 13, 1),
-    R('A', 7, 9, 14, 1),  R('F', 9, 9, 14, 1),
+#define R(port, bit, function, timer, channel)                                                                         \
+    {                                                                                                                  \
+        F405_PIN(port, bit), function, timer, channel - 1                                                              \
+    }
+    R('A', 8, 1, 1, 1),  R('A', 9, 1, 1, 2),   R('A', 10, 1, 1, 3), R('A', 11, 1, 1, 4), R('E', 9, 1, 1, 1),
+    R('E', 11, 1, 1, 2), R('E', 13, 1, 1, 3),  R('E', 14, 1, 1, 4), R('A', 0, 1, 2, 1),  R('A', 5, 1, 2, 1),
+    R('A', 15, 1, 2, 1), R('A', 1, 1, 2, 2),   R('B', 3, 1, 2, 2),  R('A', 2, 1, 2, 3),  R('B', 10, 1, 2, 3),
+    R('A', 3, 1, 2, 4),  R('B', 11, 1, 2, 4),  R('A', 6, 2, 3, 1),  R('B', 4, 2, 3, 1),  R('C', 6, 2, 3, 1),
+    R('A', 7, 2, 3, 2),  R('B', 5, 2, 3, 2),   R('C', 7, 2, 3, 2),  R('B', 0, 2, 3, 3),  R('C', 8, 2, 3, 3),
+    R('B', 1, 2, 3, 4),  R('C', 9, 2, 3, 4),   R('B', 6, 2, 4, 1),  R('D', 12, 2, 4, 1), R('B', 7, 2, 4, 2),
+    R('D', 13, 2, 4, 2), R('B', 8, 2, 4, 3),   R('D', 14, 2, 4, 3), R('B', 9, 2, 4, 4),  R('D', 15, 2, 4, 4),
+    R('A', 0, 2, 5, 1),  R('H', 10, 2, 5, 1),  R('A', 1, 2, 5, 2),  R('H', 11, 2, 5, 2), R('A', 2, 2, 5, 3),
+    R('H', 12, 2, 5, 3), R('A', 3, 2, 5, 4),   R('I', 0, 2, 5, 4),  R('C', 6, 3, 8, 1),  R('I', 5, 3, 8, 1),
+    R('C', 7, 3, 8, 2),  R('I', 6, 3, 8, 2),   R('C', 8, 3, 8, 3),  R('I', 7, 3, 8, 3),  R('C', 9, 3, 8, 4),
+    R('I', 2, 3, 8, 4),  R('A', 2, 3, 9, 1),   R('E', 5, 3, 9, 1),  R('A', 3, 3, 9, 2),  R('E', 6, 3, 9, 2),
+    R('B', 8, 3, 10, 1), R('F', 6, 3, 10, 1),  R('B', 9, 3, 11, 1), R('F', 7, 3, 11, 1), R('B', 14, 9, 12, 1),
+    R('H', 6, 9, 12, 1), R('B', 15, 9, 12, 2), R('H', 9, 9, 12, 2), R('A', 6, 9, 13, 1), R('F', 8, 9, 13, 1),
+    R('A', 7, 9, 14, 1), R('F', 9, 9, 14, 1),
 #undef R
 };
 #define ROUTES (sizeof routes / sizeof *routes)
@@ -63,7 +66,7 @@ static enum f405_level chip_drives(struct f405 *chip, int pin)
         const struct timer *t = &chip->timer[r->timer];
         if (bits(t->ccmr[r->channel / 2], r->channel % 2 * 8, 2))
             return F405_FLOATING;
-        level = timer_level(chip, r->timer, r->channel);
+        level = f405_timer_level(chip, r->timer, r->channel);
         break;
     }
     default:
@@ -74,7 +77,7 @@ static enum f405_level chip_drives(struct f405 *chip, int pin)
     return level ? F405_HIGH : F405_LOW;
 }
 
-void gpio_update(struct f405 *chip, int pin, uint64_t at)
+void f405_gpio_update(struct f405 *chip, int pin, uint64_t at)
 {
     struct pin *p = &chip->pin[pin];
     enum f405_level output = chip_drives(chip, pin);
@@ -84,7 +87,7 @@ void gpio_update(struct f405 *chip, int pin, uint64_t at)
             chip->ops->pin(chip->context, pin, output, at);
     }
     unsigned pull = bits(chip->gpio[pin / 16].pupdr, pin % 16 * 2, 2);
-    bool level = output != F405_FLOATING       ? output == F405_HIGH
+    bool level = output != F405_FLOATING      ? output == F405_HIGH
                  : p->driven != F405_FLOATING ? p->driven == F405_HIGH
                  : pull                       ? pull == 1
                                               : p->level;
@@ -93,24 +96,24 @@ void gpio_update(struct f405 *chip, int pin, uint64_t at)
     p->level = level;
     /* 12.2.5: which port's pin a line is. */
     if (bits(chip->exti.cr[pin % 16 / 4], pin % 4 * 4, 4) == (uint32_t)(pin / 16))
-        exti_edge(chip, pin % 16, level);
+        f405_exti_edge(chip, pin % 16, level);
     const struct route *r = route_of(chip, pin);
     if (r)
-        timer_pin_edge(chip, r->timer, r->channel, level, at);
+        f405_timer_pin_edge(chip, r->timer, r->channel, level, at);
 }
 
-void gpio_timer_output(struct f405 *chip, int timer, int channel, uint64_t at)
+void f405_gpio_timer_output(struct f405 *chip, int timer, int channel, uint64_t at)
 {
     for (size_t i = 0; i < ROUTES; i++)
         if (routes[i].timer == timer && routes[i].channel == channel && route_of(chip, routes[i].pin) == &routes[i])
-            gpio_update(chip, routes[i].pin, at);
+            f405_gpio_update(chip, routes[i].pin, at);
 }
 
 static void update_port(struct f405 *chip, int port, uint32_t changed)
 {
     for (int i = 0; i < 16; i++)
         if (changed >> i & 1)
-            gpio_update(chip, port * 16 + i, chip->now);
+            f405_gpio_update(chip, port * 16 + i, chip->now);
 }
 
 static uint32_t inputs(const struct f405 *chip, int port)
@@ -122,7 +125,7 @@ static uint32_t inputs(const struct f405 *chip, int port)
     return idr;
 }
 
-bool gpio_access(struct f405 *chip, int port, uint32_t offset, bool write, uint32_t *value)
+bool f405_gpio_access(struct f405 *chip, int port, uint32_t offset, bool write, uint32_t *value)
 {
     struct gpio *g = &chip->gpio[port];
     uint32_t *const plain[] = {&g->moder, &g->otyper, &g->ospeedr, &g->pupdr,  NULL,
@@ -153,7 +156,7 @@ bool gpio_access(struct f405 *chip, int port, uint32_t offset, bool write, uint3
     }
 }
 
-void gpio_reset(struct f405 *chip)
+void f405_gpio_reset(struct f405 *chip)
 {
     memset(chip->gpio, 0, sizeof chip->gpio);
     /* 8.4.1, 8.4.4: the debug port's pins. */
@@ -162,13 +165,13 @@ void gpio_reset(struct f405 *chip)
     chip->gpio[1].moder = 0x00000280;
     chip->gpio[1].pupdr = 0x00000100;
     for (int i = 0; i < F405_PINS; i++)
-        gpio_update(chip, i, chip->now);
+        f405_gpio_update(chip, i, chip->now);
 }
 
 void f405_drive(struct f405 *chip, int pin, enum f405_level level)
 {
     chip->pin[pin].driven = level;
-    gpio_update(chip, pin, chip->now);
+    f405_gpio_update(chip, pin, chip->now);
     f405_schedule(chip);
 }
 
@@ -184,13 +187,13 @@ static void exti_lines(struct f405 *chip)
     const struct exti *e = &chip->exti;
     uint32_t active = e->pr & e->imr;
     for (int i = 0; i < 5; i++)
-        cpu_irq(chip, 6 + i, active >> i & 1);
-    cpu_irq(chip, 23, active & 0x03e0);
-    cpu_irq(chip, 40, active & 0xfc00);
-    cpu_irq(chip, 42, active & 1u << 18); /* OTG_FS wake-up */
+        f405_cpu_irq(chip, 6 + i, active >> i & 1);
+    f405_cpu_irq(chip, 23, active & 0x03e0);
+    f405_cpu_irq(chip, 40, active & 0xfc00);
+    f405_cpu_irq(chip, 42, active & 1u << 18); /* OTG_FS wake-up */
 }
 
-void exti_edge(struct f405 *chip, int line, bool rising)
+void f405_exti_edge(struct f405 *chip, int line, bool rising)
 {
     struct exti *e = &chip->exti;
     if ((rising ? e->rtsr : e->ftsr) >> line & 1) {
@@ -201,7 +204,7 @@ void exti_edge(struct f405 *chip, int line, bool rising)
     }
 }
 
-bool exti_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_exti_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     struct exti *e = &chip->exti;
@@ -222,7 +225,7 @@ bool exti_access(struct f405 *chip, int index, uint32_t offset, bool write, uint
     return true;
 }
 
-bool syscfg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_syscfg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     struct exti *e = &chip->exti;

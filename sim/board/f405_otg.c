@@ -7,27 +7,27 @@
 #define OTG_WAKE_LINE 18
 #define FIFO_WORDS 320 /* 34.11: 1.25 KiB for all FIFOs */
 
-unsigned otg_packet_size(const struct otg_endpoint *endpoint, int number)
+unsigned f405_otg_packet_size(const struct otg_endpoint *endpoint, int number)
 {
     static const uint8_t ep0[4] = {64, 32, 16, 8};
     return number == 0 ? ep0[endpoint->ctl & 3] : endpoint->ctl & 0x7ff;
 }
 
-unsigned otg_fifo_words(const struct otg *otg, int number)
+unsigned f405_otg_fifo_words(const struct otg *otg, int number)
 {
     return otg->dieptxf[number] >> 16;
 }
 
 static unsigned free_words(const struct otg *otg, int number)
 {
-    return otg_fifo_words(otg, number) - otg->in[number].fifo_bytes / 4;
+    return f405_otg_fifo_words(otg, number) - otg->in[number].fifo_bytes / 4;
 }
 
 /* What of an IN endpoint's interrupt register is so by its FIFO. */
 static uint32_t in_interrupts(const struct otg *otg, int number)
 {
     const struct otg_endpoint *e = &otg->in[number];
-    unsigned size = otg_fifo_words(otg, number), left = e->fifo_bytes / 4;
+    unsigned size = f405_otg_fifo_words(otg, number), left = e->fifo_bytes / 4;
     bool empty = otg->gahbcfg & 1u << 7 ? left == 0 : left <= size / 2;
     uint32_t value = e->interrupt | (empty ? TXFE : 0);
     return e->ctl & NAKSTS ? value | INEPNE : value & ~(uint32_t)INEPNE;
@@ -56,13 +56,13 @@ static uint32_t gintsts(const struct otg *otg)
     return value;
 }
 
-void otg_interrupts(struct f405 *chip)
+void f405_otg_interrupts(struct f405 *chip)
 {
     const struct otg *o = &chip->otg;
-    cpu_irq(chip, OTG_IRQ, o->gahbcfg & 1 && gintsts(o) & o->gintmsk);
+    f405_cpu_irq(chip, OTG_IRQ, o->gahbcfg & 1 && gintsts(o) & o->gintmsk);
 }
 
-void otg_reset(struct f405 *chip)
+void f405_otg_reset(struct f405 *chip)
 {
     bool vbus = chip->otg.vbus;
     struct otg *o = &chip->otg;
@@ -79,7 +79,7 @@ void otg_reset(struct f405 *chip)
     o->dsts = 0x10;
     o->in[0].ctl = o->out[0].ctl = USBAEP;
     o->reset_end = F405_NEVER;
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
 }
 
 bool f405_usb_attached(const struct f405 *chip)
@@ -169,7 +169,7 @@ static void write_grstctl(struct f405 *chip, uint32_t value)
 {
     struct otg *o = &chip->otg;
     if (value & 1)
-        otg_reset(chip);
+        f405_otg_reset(chip);
     if (value & 0x10)
         o->head = o->tail = o->words = o->read_at = o->read_end = 0;
     if (value & 0x20) {
@@ -184,9 +184,10 @@ static void write_dctl(struct f405 *chip, uint32_t value)
 {
     struct otg *o = &chip->otg;
     uint32_t states = o->dctl & 0xc;
-    states = (states | (value >> 7 & 1) << 2 | (value >> 9 & 1) << 3) & ~((value >> 8 & 1) << 2 | (value >> 10 & 1) << 3);
+    states =
+        (states | (value >> 7 & 1) << 2 | (value >> 9 & 1) << 3) & ~((value >> 8 & 1) << 2 | (value >> 10 & 1) << 3);
     if (value >> 9 & 1 && !(o->dctl & 8))
-        otg_push(chip, 1u << 17, NULL, 0);
+        f405_otg_push(chip, 1u << 17, NULL, 0);
     if (value >> 7 & 1)
         o->gintsts |= 1u << 6;
     if (value >> 8 & 1)
@@ -306,7 +307,7 @@ static bool core_access(struct f405 *chip, uint32_t offset, bool write, uint32_t
     }
 }
 
-bool otg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_otg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     struct otg *o = &chip->otg;
@@ -337,6 +338,6 @@ bool otg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint3
                 *plain[i].reg = *value;
         }
     }
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
     return known;
 }

@@ -32,10 +32,10 @@
 #define INEPNE (1u << 6)
 #define TXFE (1u << 7)
 
-unsigned otg_packet_size(const struct otg_endpoint *endpoint, int number);
-unsigned otg_fifo_words(const struct otg *otg, int number);
-void otg_interrupts(struct f405 *chip);
+unsigned f405_otg_packet_size(const struct otg_endpoint *endpoint, int number);
+unsigned f405_otg_fifo_words(const struct otg *otg, int number);
+void f405_otg_interrupts(struct f405 *chip);
 /* An entry of the receive FIFO; false: no room. */
-bool otg_push(struct f405 *chip, uint32_t status, const uint8_t *data, size_t size);
+bool f405_otg_push(struct f405 *chip, uint32_t status, const uint8_t *data, size_t size);
 
 #endif

@@ -5,7 +5,7 @@
 
 enum { KIND_OUT = 2, KIND_OUT_DONE = 3, KIND_SETUP_DONE = 4, KIND_SETUP = 6 };
 
-bool otg_push(struct f405 *chip, uint32_t status, const uint8_t *data, size_t size)
+bool f405_otg_push(struct f405 *chip, uint32_t status, const uint8_t *data, size_t size)
 {
     struct otg *o = &chip->otg;
     unsigned words = 1 + ((unsigned)size + 3) / 4;
@@ -44,7 +44,7 @@ void f405_usb_vbus(struct f405 *chip, bool on)
         o->gintsts |= ESUSP | USBSUSP;
         o->dsts |= 1;
     }
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
 }
 
 void f405_usb_reset(struct f405 *chip, bool begin)
@@ -64,16 +64,16 @@ void f405_usb_reset(struct f405 *chip, bool begin)
         o->in[i].ctl &= ~USBAEP;
         o->out[i].ctl &= ~USBAEP;
     }
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
 }
 
-void otg_event(struct f405 *chip)
+void f405_otg_event(struct f405 *chip)
 {
     struct otg *o = &chip->otg;
     o->reset_end = F405_NEVER;
     o->gintsts |= ENUMDNE;
     o->dsts = (o->dsts & ~6u) | 3u << 1; /* full speed */
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
 }
 
 void f405_usb_suspend(struct f405 *chip, bool begin)
@@ -87,9 +87,9 @@ void f405_usb_suspend(struct f405 *chip, bool begin)
     } else {
         o->gintsts |= WKUPINT;
         o->dsts &= ~1u;
-        exti_edge(chip, 18, true); /* 12.2.5 */
+        f405_exti_edge(chip, 18, true); /* 12.2.5 */
     }
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
 }
 
 void f405_usb_sof(struct f405 *chip, unsigned frame)
@@ -99,7 +99,7 @@ void f405_usb_sof(struct f405 *chip, unsigned frame)
         return;
     o->dsts = (o->dsts & ~(0x3fffu << 8)) | (frame & 0x7ff) << 8;
     o->gintsts |= SOF;
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
 }
 
 enum f405_usb_answer f405_usb_setup(struct f405 *chip, int address, int endpoint, const uint8_t setup[8])
@@ -109,16 +109,16 @@ enum f405_usb_answer f405_usb_setup(struct f405 *chip, int address, int endpoint
         return F405_USB_NONE;
     struct otg_endpoint *out = &o->out[0], *in = &o->in[0];
     /* 34.17.4: three SETUPs and their end always have room; if the firmware left none, the token goes unanswered. */
-    if (o->words + 4 > o->grxfsiz || !otg_push(chip, (uint32_t)KIND_SETUP << 17, setup, 8))
+    if (o->words + 4 > o->grxfsiz || !f405_otg_push(chip, (uint32_t)KIND_SETUP << 17, setup, 8))
         return F405_USB_NONE;
-    otg_push(chip, (uint32_t)KIND_SETUP_DONE << 17, NULL, 0);
+    f405_otg_push(chip, (uint32_t)KIND_SETUP_DONE << 17, NULL, 0);
     unsigned count = out->tsiz >> 29 & 3;
     if (count)
         out->tsiz = (out->tsiz & ~(3u << 29)) | (count - 1) << 29;
     out->ctl = (out->ctl | NAKSTS) & ~STALL;
     in->ctl = (in->ctl | NAKSTS) & ~STALL;
     out->data1 = in->data1 = true;
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
     return F405_USB_ACK;
 }
 
@@ -131,7 +131,7 @@ enum f405_usb_answer f405_usb_out(struct f405 *chip, int address, int endpoint, 
     struct otg_endpoint *e = &o->out[endpoint];
     if (e->ctl & STALL)
         return F405_USB_STALL;
-    unsigned most = otg_packet_size(e, endpoint), left = e->tsiz & 0x7ffff, packets = e->tsiz >> 19 & 0x3ff;
+    unsigned most = f405_otg_packet_size(e, endpoint), left = e->tsiz & 0x7ffff, packets = e->tsiz >> 19 & 0x3ff;
     if (size > most) /* babble: no handshake, USB 2.0 8.7.4 */
         return F405_USB_NONE;
     if (!(e->ctl & EPENA) || e->ctl & NAKSTS || o->dctl & 8 || !packets)
@@ -143,14 +143,14 @@ enum f405_usb_answer f405_usb_out(struct f405 *chip, int address, int endpoint, 
     if (o->words + words > o->grxfsiz)
         return F405_USB_NAK;
     uint32_t status = (uint32_t)endpoint | (data1 ? 2u << 15 : 0);
-    otg_push(chip, status | (uint32_t)KIND_OUT << 17, data, size);
+    f405_otg_push(chip, status | (uint32_t)KIND_OUT << 17, data, size);
     e->data1 = !e->data1;
     e->tsiz = (e->tsiz & 0x60000000u) | (packets - 1) << 19 | (size < left ? left - (unsigned)size : 0);
     if (last) {
-        otg_push(chip, status | (uint32_t)KIND_OUT_DONE << 17, NULL, 0);
+        f405_otg_push(chip, status | (uint32_t)KIND_OUT_DONE << 17, NULL, 0);
         e->ctl |= NAKSTS;
     }
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
     return F405_USB_ACK;
 }
 
@@ -165,11 +165,11 @@ enum f405_usb_answer f405_usb_in(struct f405 *chip, int address, int endpoint, u
         return F405_USB_STALL;
     if (!(e->ctl & EPENA) || e->ctl & NAKSTS || o->dctl & 4)
         return F405_USB_NAK;
-    unsigned most = otg_packet_size(e, endpoint), left = e->tsiz & 0x7ffff, packets = e->tsiz >> 19 & 0x3ff;
+    unsigned most = f405_otg_packet_size(e, endpoint), left = e->tsiz & 0x7ffff, packets = e->tsiz >> 19 & 0x3ff;
     unsigned length = left < most ? left : most, taken = (length + 3) & ~3u;
     if (e->fifo_bytes < taken) {
         e->interrupt |= ITTXFE;
-        otg_interrupts(chip);
+        f405_otg_interrupts(chip);
         return F405_USB_NAK;
     }
     memcpy(data, e->fifo, length);
@@ -188,6 +188,6 @@ enum f405_usb_answer f405_usb_in(struct f405 *chip, int address, int endpoint, u
         o->address = (int)(o->dcfg >> 4 & 0x7f);
         o->address_waits = false;
     }
-    otg_interrupts(chip);
+    f405_otg_interrupts(chip);
     return F405_USB_ACK;
 }

@@ -20,9 +20,9 @@ struct cpu {
     uint8_t priority[F405_EXCEPTIONS];
     bool enabled[F405_EXCEPTIONS], pending[F405_EXCEPTIONS], active[F405_EXCEPTIONS], line[F405_EXCEPTIONS];
     uint64_t pended[F405_EXCEPTIONS];
-    int stack[32], depth;      /* exceptions that are active, innermost last */
-    uint32_t spent[32];        /* instructions of each */
-    int candidate;             /* the most urgent that is pending and enabled; 0: none */
+    int stack[32], depth; /* exceptions that are active, innermost last */
+    uint32_t spent[32];   /* instructions of each */
+    int candidate;        /* the most urgent that is pending and enabled; 0: none */
     uint32_t systick_ctrl, systick_load;
     uint64_t systick_base, systick_next; /* when the counter was, will be 0 */
     bool systick_flag;
@@ -32,17 +32,17 @@ struct cpu {
 };
 
 struct rcc {
-    uint32_t reg[36]; /* by offset / 4 */
-    unsigned cost;    /* cycles of 168 MHz an instruction takes */
+    uint32_t reg[36];                            /* by offset / 4 */
+    unsigned cost;                               /* cycles of 168 MHz an instruction takes */
     unsigned apb1, apb2, tim1_clock, tim2_clock; /* cycles of 168 MHz a clock of the buses and their timers takes */
 };
 
 struct flash {
     uint32_t acr, sr, cr, optcr;
-    int unlock;   /* keys given */
+    int unlock; /* keys given */
     bool locked_out;
-    uint64_t done; /* F405_NEVER: idle */
-    int sector;    /* being erased, or −1 */
+    uint64_t done;          /* F405_NEVER: idle */
+    int sector;             /* being erased, or −1 */
     uint32_t address, size; /* being programmed */
     uint64_t value;
     /* A write that Unicorn will carry out behind the model's back; put right at the next look. */
@@ -65,7 +65,7 @@ struct exti {
 struct timer {
     uint32_t cr1, cr2, smcr, dier, sr, ccmr[2], ccer, psc, arr, rcr, ccr[4], bdtr, dcr;
     uint32_t psc_now, arr_now, ccr_now[4], repeat;
-    uint32_t cnt;  /* at cycle `base` */
+    uint32_t cnt; /* at cycle `base` */
     uint64_t base;
     bool ref[4], shown[4]; /* OCxREF; what the output last was */
 };
@@ -172,58 +172,59 @@ void f405_bus_write(struct f405 *chip, uint32_t address, unsigned size, uint32_t
 bool f405_mmio(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t *value);
 
 /* f405_cpu.c: exceptions and the private peripheral bus. */
-void cpu_reset(struct f405 *chip);
-bool cpu_wakes(const struct f405 *chip);
-void cpu_irq(struct f405 *chip, int irq, bool level);
-void cpu_pend(struct f405 *chip, int exception);
-void cpu_update(struct f405 *chip);
-bool cpu_deliverable(struct f405 *chip);
-void cpu_enter(struct f405 *chip);
-void cpu_return(struct f405 *chip);
-uint64_t cpu_next(const struct f405 *chip);
-void cpu_event(struct f405 *chip);
-bool ppb_access(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t *value);
+void f405_cpu_reset(struct f405 *chip);
+bool f405_cpu_wakes(const struct f405 *chip);
+void f405_cpu_irq(struct f405 *chip, int irq, bool level);
+void f405_cpu_pend(struct f405 *chip, int exception);
+void f405_cpu_update(struct f405 *chip);
+bool f405_cpu_deliverable(struct f405 *chip);
+void f405_cpu_enter(struct f405 *chip);
+void f405_cpu_return(struct f405 *chip);
+uint64_t f405_cpu_next(const struct f405 *chip);
+void f405_cpu_event(struct f405 *chip);
+bool f405_ppb_access(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t *value);
 
 /* A peripheral's registers: `value` in and out; false: no such register. */
-typedef bool peripheral_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value);
-peripheral_access rcc_access, pwr_access, dbgmcu_access, iwdg_access, rng_access, crc_access, flash_access, gpio_access,
-    exti_access, syscfg_access, timer_access, dma_access, usart_access, adc_access, otg_access;
+typedef bool f405_peripheral_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value);
+f405_peripheral_access f405_rcc_access, f405_pwr_access, f405_dbgmcu_access, f405_iwdg_access, f405_rng_access,
+    f405_crc_access, f405_flash_access, f405_gpio_access, f405_exti_access, f405_syscfg_access, f405_timer_access,
+    f405_dma_access, f405_usart_access, f405_adc_access, f405_otg_access;
 
-void rcc_reset(struct f405 *chip, uint32_t flags);
-bool rcc_enabled(const struct f405 *chip, uint32_t offset, int bit);
-uint64_t iwdg_next(const struct f405 *chip);
-void iwdg_event(struct f405 *chip);
+void f405_rcc_reset(struct f405 *chip, uint32_t flags);
+bool f405_rcc_enabled(const struct f405 *chip, uint32_t offset, int bit);
+uint64_t f405_iwdg_next(const struct f405 *chip);
+void f405_iwdg_event(struct f405 *chip);
 
-void flash_reset(struct f405 *chip);
-bool flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, uint64_t value);
-void flash_fix(struct f405 *chip);
-void flash_event(struct f405 *chip);
-void flash_power_cut(struct f405 *chip);
+void f405_flash_reset(struct f405 *chip);
+bool f405_flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, uint64_t value);
+void f405_flash_fix(struct f405 *chip);
+void f405_flash_event(struct f405 *chip);
+void f405_flash_power_cut(struct f405 *chip);
 
-void gpio_reset(struct f405 *chip);
-void gpio_update(struct f405 *chip, int pin, uint64_t at);
+void f405_gpio_reset(struct f405 *chip);
+void f405_gpio_update(struct f405 *chip, int pin, uint64_t at);
 /* The output of a peripheral that may be routed to pins has changed. */
-void gpio_timer_output(struct f405 *chip, int timer, int channel, uint64_t at);
-void exti_edge(struct f405 *chip, int line, bool rising);
+void f405_gpio_timer_output(struct f405 *chip, int timer, int channel, uint64_t at);
+void f405_exti_edge(struct f405 *chip, int line, bool rising);
 
-void timer_reset(struct f405 *chip);
-uint64_t timer_next(const struct f405 *chip, int index);
-void timer_sync(struct f405 *chip, int index, uint64_t to);
-bool timer_level(const struct f405 *chip, int index, int channel);
-void timer_pin_edge(struct f405 *chip, int index, int channel, bool level, uint64_t at);
-uint32_t timer_count(const struct f405 *chip, int index, uint64_t at);
+void f405_timer_reset(struct f405 *chip);
+uint64_t f405_timer_next(const struct f405 *chip, int index);
+void f405_timer_sync(struct f405 *chip, int index, uint64_t to);
+bool f405_timer_level(const struct f405 *chip, int index, int channel);
+void f405_timer_pin_edge(struct f405 *chip, int index, int channel, bool level, uint64_t at);
+uint32_t f405_timer_count(const struct f405 *chip, int index, uint64_t at);
 
 /* One item of whatever stream listens to `channel`; false: none is enabled. */
-bool dma_request(struct f405 *chip, int dma, int stream, int channel);
+bool f405_dma_request(struct f405 *chip, int dma, int stream, int channel);
 
-void usart_reset(struct f405 *chip);
-uint64_t usart_next(const struct f405 *chip, int index);
-void usart_event(struct f405 *chip, int index);
-void usart_pump(struct f405 *chip, int index);
+void f405_usart_reset(struct f405 *chip);
+uint64_t f405_usart_next(const struct f405 *chip, int index);
+void f405_usart_event(struct f405 *chip, int index);
+void f405_usart_pump(struct f405 *chip, int index);
 
-void adc_event(struct f405 *chip);
-void otg_reset(struct f405 *chip);
-void otg_event(struct f405 *chip);
+void f405_adc_event(struct f405 *chip);
+void f405_otg_reset(struct f405 *chip);
+void f405_otg_event(struct f405 *chip);
 
 static inline uint32_t bits(uint32_t value, int low, int count)
 {

@@ -49,7 +49,7 @@ static void clocks(struct f405 *chip)
     chip->rcc.tim1_clock = p2 == 1 ? chip->rcc.cost : chip->rcc.cost * p2 / 2;
 }
 
-void rcc_reset(struct f405 *chip, uint32_t flags)
+void f405_rcc_reset(struct f405 *chip, uint32_t flags)
 {
     uint32_t csr = chip->rcc.reg[CSR], bdcr = chip->rcc.reg[BDCR];
     memset(chip->rcc.reg, 0, sizeof chip->rcc.reg);
@@ -68,7 +68,7 @@ void rcc_reset(struct f405 *chip, uint32_t flags)
     clocks(chip);
 }
 
-bool rcc_enabled(const struct f405 *chip, uint32_t offset, int bit)
+bool f405_rcc_enabled(const struct f405 *chip, uint32_t offset, int bit)
 {
     return chip->rcc.reg[offset / 4] >> bit & 1;
 }
@@ -97,7 +97,7 @@ static void write_register(struct f405 *chip, int i, uint32_t value)
             f405_complain(chip, "RCC_CFGR 0x%08x: the clock is not ready", value);
         reg[CFGR] = (value & ~0xcu) | (value & 3) << 2;
         for (int t = 1; t < TIMERS; t++)
-            timer_sync(chip, t, chip->now);
+            f405_timer_sync(chip, t, chip->now);
         clocks(chip);
         break;
     }
@@ -109,7 +109,7 @@ static void write_register(struct f405 *chip, int i, uint32_t value)
     }
 }
 
-bool rcc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_rcc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     if (offset > 0x84 || offset == 0x1c || offset == 0x28 || offset == 0x2c || offset == 0x3c || offset == 0x48 ||
@@ -122,7 +122,7 @@ bool rcc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint3
     return true;
 }
 
-bool pwr_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_pwr_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     if (offset == 4) { /* CSR: VOSRDY */
@@ -138,7 +138,7 @@ bool pwr_access(struct f405 *chip, int index, uint32_t offset, bool write, uint3
     return true;
 }
 
-bool dbgmcu_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_dbgmcu_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     if (offset == 0) {
@@ -161,7 +161,7 @@ static void iwdg_restart(struct f405 *chip)
     w->expires = chip->now + (w->rlr + 1) * divider * (F405_HZ / LSI_HZ);
 }
 
-bool iwdg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_iwdg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     struct watchdog *w = &chip->watchdog;
@@ -196,12 +196,12 @@ bool iwdg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint
     }
 }
 
-uint64_t iwdg_next(const struct f405 *chip)
+uint64_t f405_iwdg_next(const struct f405 *chip)
 {
     return chip->watchdog.started ? chip->watchdog.expires : F405_NEVER;
 }
 
-void iwdg_event(struct f405 *chip)
+void f405_iwdg_event(struct f405 *chip)
 {
     chip->watchdog.started = false;
     f405_want_reset(chip, 0x24000000u); /* IWDGRSTF, PINRSTF */
@@ -209,7 +209,7 @@ void iwdg_event(struct f405 *chip)
 
 /* ---- small ones ---- */
 
-bool rng_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_rng_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     if (offset == 0) {
@@ -225,7 +225,7 @@ bool rng_access(struct f405 *chip, int index, uint32_t offset, bool write, uint3
     return true;
 }
 
-bool crc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_crc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     if (offset == 8 && write) {

@@ -31,7 +31,7 @@ static unsigned channel_mode(const struct timer *t, int channel, int low, int co
     return bits(t->ccmr[channel / 2], channel % 2 * 8 + low, count);
 }
 
-void timer_reset(struct f405 *chip)
+void f405_timer_reset(struct f405 *chip)
 {
     for (int i = 1; i < TIMERS; i++)
         chip->timer[i].arr = chip->timer[i].arr_now = wide(i) ? 0xffffffffu : 0xffff;
@@ -45,10 +45,10 @@ static void interrupts(struct f405 *chip, int index)
     static const uint8_t irq[TIMERS] = {0, 25, 28, 29, 30, 50, 54, 55, 44, 24, 25, 26, 43, 44, 45};
     uint32_t active = t->sr & t->dier & 0x5f;
     if (advanced(index)) { /* update and compare have vectors of their own */
-        cpu_irq(chip, irq[index], active & 1);
-        cpu_irq(chip, irq[index] + 2, active & 0x1e);
+        f405_cpu_irq(chip, irq[index], active & 1);
+        f405_cpu_irq(chip, irq[index] + 2, active & 0x1e);
     } else {
-        cpu_irq(chip, irq[index], active);
+        f405_cpu_irq(chip, irq[index], active);
     }
 }
 
@@ -71,12 +71,12 @@ static void request_dma(struct f405 *chip, int index, int source)
         return;
     for (size_t i = 0; i < sizeof map / sizeof *map; i++)
         if (map[i].timer == index && map[i].source == source)
-            dma_request(chip, map[i].dma, map[i].stream, map[i].channel);
+            f405_dma_request(chip, map[i].dma, map[i].stream, map[i].channel);
 }
 
 /* ---- outputs ---- */
 
-bool timer_level(const struct f405 *chip, int index, int channel)
+bool f405_timer_level(const struct f405 *chip, int index, int channel)
 {
     const struct timer *t = &chip->timer[index];
     if (!(t->ccer >> (channel * 4) & 1) || (advanced(index) && !(t->bdtr >> 15 & 1)))
@@ -112,17 +112,17 @@ static void outputs(struct f405 *chip, int index, uint64_t at)
 {
     struct timer *t = &chip->timer[index];
     for (int c = 0; c < 4; c++) {
-        bool level = timer_level(chip, index, c);
+        bool level = f405_timer_level(chip, index, c);
         if (level != t->shown[c]) {
             t->shown[c] = level;
-            gpio_timer_output(chip, index, c, at);
+            f405_gpio_timer_output(chip, index, c, at);
         }
     }
 }
 
 /* ---- counting ---- */
 
-uint32_t timer_count(const struct f405 *chip, int index, uint64_t at)
+uint32_t f405_timer_count(const struct f405 *chip, int index, uint64_t at)
 {
     const struct timer *t = &chip->timer[index];
     if (!(t->cr1 & CEN) || at < t->base)
@@ -136,7 +136,7 @@ static uint64_t top(int index, const struct timer *t)
 }
 
 /* When something happens to it next: the counter reaches a compare value, or wraps. */
-uint64_t timer_next(const struct f405 *chip, int index)
+uint64_t f405_timer_next(const struct f405 *chip, int index)
 {
     const struct timer *t = &chip->timer[index];
     if (!(t->cr1 & CEN))
@@ -212,9 +212,9 @@ static void step(struct f405 *chip, int index, uint64_t at)
             request_dma(chip, index, c + 1);
 }
 
-void timer_sync(struct f405 *chip, int index, uint64_t to)
+void f405_timer_sync(struct f405 *chip, int index, uint64_t to)
 {
-    for (uint64_t at = timer_next(chip, index); at <= to; at = timer_next(chip, index))
+    for (uint64_t at = f405_timer_next(chip, index); at <= to; at = f405_timer_next(chip, index))
         step(chip, index, at);
 }
 
@@ -225,16 +225,16 @@ static void capture(struct f405 *chip, int index, int channel, uint64_t at)
     struct timer *t = &chip->timer[index];
     if (t->sr & 2u << channel)
         t->sr |= 0x200u << channel; /* over-capture */
-    t->ccr[channel] = t->ccr_now[channel] = timer_count(chip, index, at);
+    t->ccr[channel] = t->ccr_now[channel] = f405_timer_count(chip, index, at);
     t->sr |= 2u << channel;
     interrupts(chip, index);
     request_dma(chip, index, channel + 1);
 }
 
-void timer_pin_edge(struct f405 *chip, int index, int channel, bool level, uint64_t at)
+void f405_timer_pin_edge(struct f405 *chip, int index, int channel, bool level, uint64_t at)
 {
     struct timer *t = &chip->timer[index];
-    timer_sync(chip, index, at);
+    f405_timer_sync(chip, index, at);
     for (int c = channel & ~1; c < (channel | 1) + 1; c++) {
         unsigned select = channel_mode(t, c, 0, 2), edge = t->ccer >> (c * 4 + 1) & 5;
         if (select != (c == channel ? 1u : 2u) || !(t->ccer >> (c * 4) & 1))
@@ -294,8 +294,8 @@ static void generate(struct f405 *chip, int index, uint32_t value)
 
 static uint32_t *plain_register(struct timer *t, uint32_t offset)
 {
-    uint32_t *const reg[] = {&t->cr1, &t->cr2,    &t->smcr,   &t->dier,   &t->sr,     NULL,     &t->ccmr[0],
-                             &t->ccmr[1], &t->ccer, &t->cnt,  &t->psc,    &t->arr,    &t->rcr,  &t->ccr[0],
+    uint32_t *const reg[] = {&t->cr1,     &t->cr2,    &t->smcr,   &t->dier, &t->sr,  NULL,    &t->ccmr[0],
+                             &t->ccmr[1], &t->ccer,   &t->cnt,    &t->psc,  &t->arr, &t->rcr, &t->ccr[0],
                              &t->ccr[1],  &t->ccr[2], &t->ccr[3], &t->bdtr, &t->dcr};
     return offset / 4 < sizeof reg / sizeof *reg ? reg[offset / 4] : NULL;
 }
@@ -345,17 +345,17 @@ static void write_register(struct f405 *chip, int index, uint32_t offset, uint32
     }
 }
 
-bool timer_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_timer_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     struct timer *t = &chip->timer[index];
     if (offset == 0x50 && (wide(index) || index == 11)) /* OR: no remapping */
         return write ? *value == 0 : (*value = 0, true);
     if (offset > 0x48 || (offset >= 0x14 && !write && offset == 0x14 && (*value = 0, false)))
         return false;
-    timer_sync(chip, index, chip->now);
+    f405_timer_sync(chip, index, chip->now);
     if (!write) {
         uint32_t *reg = plain_register(t, offset);
-        *value = offset == 0x24 ? timer_count(chip, index, chip->now) : reg ? *reg : 0;
+        *value = offset == 0x24 ? f405_timer_count(chip, index, chip->now) : reg ? *reg : 0;
         if (offset >= 0x34 && offset <= 0x40 && channel_mode(t, (int)(offset - 0x34) / 4, 0, 2))
             t->sr &= ~(2u << (offset - 0x34) / 4); /* reading a capture clears its flag: 18.4.5 */
         interrupts(chip, index);

@@ -8,7 +8,7 @@ enum { FE = 2, ORE = 8, IDLE = 0x10, RXNE = 0x20, TC = 0x40, TXE = 0x80 };
 enum { RE = 4, TE = 8, IDLEIE = 0x10, RXNEIE = 0x20, TCIE = 0x40, TXEIE = 0x80, UE = 0x2000, OVER8 = 0x8000 };
 enum { EIE = 1, DMAR = 0x40, DMAT = 0x80 };
 
-void usart_reset(struct f405 *chip)
+void f405_usart_reset(struct f405 *chip)
 {
     for (int i = 1; i < F405_USARTS; i++)
         chip->usart[i] = (struct usart){.sr = 0xc0, .sent = F405_NEVER, .arrives = F405_NEVER, .idle = F405_NEVER};
@@ -31,26 +31,29 @@ static void interrupts(struct f405 *chip, int index)
     bool active = (u->cr1 & IDLEIE && u->sr & IDLE) || (u->cr1 & RXNEIE && u->sr & (RXNE | ORE)) ||
                   (u->cr1 & TCIE && u->sr & TC) || (u->cr1 & TXEIE && u->sr & TXE) ||
                   (u->cr3 & EIE && u->cr3 & DMAR && u->sr & (FE | ORE));
-    cpu_irq(chip, irq[index], active);
+    f405_cpu_irq(chip, irq[index], active);
 }
 
 /* Tables 42 and 43: where requests go; −1 ends. */
 static bool ask_dma(struct f405 *chip, int index, bool transmit)
 {
     static const int8_t map[F405_USARTS][2][2][3] = {
-        [1] = {{{1, 2, 4}, {1, 5, 4}}, {{1, 7, 4}, {-1, 0, 0}}}, [2] = {{{0, 5, 4}, {-1, 0, 0}}, {{0, 6, 4}, {-1, 0, 0}}},
-        [3] = {{{0, 1, 4}, {-1, 0, 0}}, {{0, 3, 4}, {0, 4, 7}}}, [4] = {{{0, 2, 4}, {-1, 0, 0}}, {{0, 4, 4}, {-1, 0, 0}}},
-        [5] = {{{0, 0, 4}, {-1, 0, 0}}, {{0, 7, 4}, {-1, 0, 0}}}, [6] = {{{1, 1, 5}, {1, 2, 5}}, {{1, 6, 5}, {1, 7, 5}}},
+        [1] = {{{1, 2, 4}, {1, 5, 4}}, {{1, 7, 4}, {-1, 0, 0}}},
+        [2] = {{{0, 5, 4}, {-1, 0, 0}}, {{0, 6, 4}, {-1, 0, 0}}},
+        [3] = {{{0, 1, 4}, {-1, 0, 0}}, {{0, 3, 4}, {0, 4, 7}}},
+        [4] = {{{0, 2, 4}, {-1, 0, 0}}, {{0, 4, 4}, {-1, 0, 0}}},
+        [5] = {{{0, 0, 4}, {-1, 0, 0}}, {{0, 7, 4}, {-1, 0, 0}}},
+        [6] = {{{1, 1, 5}, {1, 2, 5}}, {{1, 6, 5}, {1, 7, 5}}},
     };
     for (int i = 0; i < 2; i++) {
         const int8_t *m = map[index][transmit][i];
-        if (m[0] >= 0 && dma_request(chip, m[0], m[1], m[2]))
+        if (m[0] >= 0 && f405_dma_request(chip, m[0], m[1], m[2]))
             return true;
     }
     return false;
 }
 
-void usart_pump(struct f405 *chip, int index)
+void f405_usart_pump(struct f405 *chip, int index)
 {
     struct usart *u = &chip->usart[index];
     if (!(u->cr1 & UE))
@@ -116,17 +119,17 @@ static void arrived(struct f405 *chip, int index)
     u->framing_error = false;
 }
 
-uint64_t usart_next(const struct f405 *chip, int index)
+uint64_t f405_usart_next(const struct f405 *chip, int index)
 {
     const struct usart *u = &chip->usart[index];
     uint64_t next = u->sent < u->arrives ? u->sent : u->arrives;
     return u->idle < next ? u->idle : next;
 }
 
-void usart_event(struct f405 *chip, int index)
+void f405_usart_event(struct f405 *chip, int index)
 {
     struct usart *u = &chip->usart[index];
-    uint64_t at = usart_next(chip, index);
+    uint64_t at = f405_usart_next(chip, index);
     if (u->sent == at)
         sent(chip, index);
     if (u->arrives == at) {
@@ -136,7 +139,7 @@ void usart_event(struct f405 *chip, int index)
         if (u->cr1 & RE)
             u->sr |= IDLE;
     }
-    usart_pump(chip, index);
+    f405_usart_pump(chip, index);
     interrupts(chip, index);
 }
 
@@ -166,7 +169,7 @@ static uint32_t read_data(struct f405 *chip, int index)
     return u->dr;
 }
 
-bool usart_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_usart_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     struct usart *u = &chip->usart[index];
     uint32_t *const reg[] = {&u->sr, &u->dr, &u->brr, &u->cr1, &u->cr2, &u->cr3, &u->gtpr};
@@ -186,7 +189,7 @@ bool usart_access(struct f405 *chip, int index, uint32_t offset, bool write, uin
     if (u->cr1 & 0x1600 || u->cr2 & 0x4800 || u->cr3 & 0x32a)
         f405_complain(chip, "USART%d: CR1 0x%x, CR2 0x%x, CR3 0x%x have a mode that is not modelled", index, u->cr1,
                       u->cr2, u->cr3);
-    usart_pump(chip, index);
+    f405_usart_pump(chip, index);
     interrupts(chip, index);
     return true;
 }
@@ -221,10 +224,11 @@ static void convert(struct f405 *chip)
 
 static void adc_interrupts(struct f405 *chip)
 {
-    cpu_irq(chip, 18, (chip->adc.sr & EOC && chip->adc.cr1 & 0x20) || (chip->adc.sr & OVR && chip->adc.cr1 & 1u << 26));
+    f405_cpu_irq(chip, 18,
+                 (chip->adc.sr & EOC && chip->adc.cr1 & 0x20) || (chip->adc.sr & OVR && chip->adc.cr1 & 1u << 26));
 }
 
-void adc_event(struct f405 *chip)
+void f405_adc_event(struct f405 *chip)
 {
     struct adc *a = &chip->adc;
     int channel = ranked_channel(a);
@@ -234,14 +238,14 @@ void adc_event(struct f405 *chip)
     if (last || a->cr2 & 1u << 10)
         a->sr |= EOC;
     a->rank = last ? 0 : a->rank + 1;
-    if (a->cr2 & 1u << 8 && (dma_request(chip, 1, 0, 0) || dma_request(chip, 1, 4, 0)))
+    if (a->cr2 & 1u << 8 && (f405_dma_request(chip, 1, 0, 0) || f405_dma_request(chip, 1, 4, 0)))
         a->sr &= ~(uint32_t)EOC;
     if (!last || a->cr2 & 2)
         convert(chip);
     adc_interrupts(chip);
 }
 
-bool adc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
+bool f405_adc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
     struct adc *a = &chip->adc;
@@ -252,9 +256,8 @@ bool adc_access(struct f405 *chip, int index, uint32_t offset, bool write, uint3
             *value = chip->adc_ccr;
         return true;
     }
-    uint32_t *const reg[] = {&a->sr, &a->cr1,    &a->cr2,    &a->smpr[0], &a->smpr[1], NULL, NULL,
-                             NULL,   NULL,       &a->htr,    &a->ltr,     &a->sqr[0],  &a->sqr[1],
-                             &a->sqr[2], NULL,   NULL,       NULL,        NULL,        NULL, &a->dr};
+    uint32_t *const reg[] = {&a->sr,  &a->cr1,    &a->cr2,    &a->smpr[0], &a->smpr[1], NULL, NULL, NULL, NULL, &a->htr,
+                             &a->ltr, &a->sqr[0], &a->sqr[1], &a->sqr[2],  NULL,        NULL, NULL, NULL, NULL, &a->dr};
     if (offset > 0x4c || !reg[offset / 4])
         return false;
     if (!write) {
