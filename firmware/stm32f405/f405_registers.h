@@ -62,6 +62,7 @@
 #define RCC_AHB1ENR_CCMDATARAMEN (1u << 20) /* set after reset */
 #define RCC_AHB1ENR_DMA1EN (1u << 21)
 #define RCC_AHB2ENR REG32(RCC_BASE + 0x34)
+#define RCC_AHB2ENR_RNGEN (1u << 6)
 #define RCC_AHB2ENR_OTGFSEN (1u << 7)
 #define RCC_APB1ENR REG32(RCC_BASE + 0x40)
 #define RCC_APB1ENR_TIM2EN (1u << 0)
@@ -230,6 +231,13 @@
 #define ADC_DR(base) REG32((base) + 0x4c)
 #define ADC_CCR REG32(ADC_COMMON_BASE + 0x04)
 #define ADC_CCR_ADCPRE_4 (1u << 16)
+
+/* RNG, section 24.4 */
+#define RNG_CR REG32(0x50060800u)
+#define RNG_CR_RNGEN (1u << 2)
+#define RNG_SR REG32(0x50060804u)
+#define RNG_SR_DRDY (1u << 0)
+#define RNG_DR REG32(0x50060808u)
 
 /* Section 39.1: 96 bits; section 2.4, table 2: the loader in system memory. */
 #define UNIQUE_ID_ADDRESS 0x1fff7a10u

@@ -76,6 +76,25 @@ void system_unique_id(uint8_t id[BOARD_UNIQUE_ID])
     memcpy(id, (const void *)UNIQUE_ID_ADDRESS, BOARD_UNIQUE_ID);
 }
 
+/* Section 24.3: the noise source, which needs 48 MHz from the PLL; without an answer the time it did not come in. */
+uint32_t system_boot_number(void)
+{
+    uint32_t number = (uint32_t)time_now();
+
+    if (ON_QEMU)
+        return number;
+    RCC_AHB2ENR |= RCC_AHB2ENR_RNGEN;
+    (void)RCC_AHB2ENR;
+    RNG_CR = RNG_CR_RNGEN;
+    for (int word = 0, patience = 1000; word < 2 && patience > 0; patience--)
+        if (RNG_SR & RNG_SR_DRDY) { /* the first one after it is switched on is not used (24.3.1) */
+            number = RNG_DR;
+            word++;
+        }
+    RNG_CR = 0;
+    return number;
+}
+
 void system_restart(void)
 {
     irq_disable();

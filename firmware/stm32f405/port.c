@@ -96,6 +96,12 @@ static void board_watchdog_kick(void *port)
     watchdog_kick();
 }
 
+static uint32_t board_boot_number(void *port)
+{
+    (void)port;
+    return system_boot_number();
+}
+
 static void board_unique_id(void *port, uint8_t id[BOARD_UNIQUE_ID])
 {
     (void)port;
@@ -152,6 +158,7 @@ static void board_restart(void *port)
 }
 
 static const struct board board = {
+    .name = "stm32f405",
     .now = board_now,
     .lock = board_lock,
     .unlock = board_unlock,
@@ -167,6 +174,7 @@ static const struct board board = {
     .supply_mv = board_supply_mv,
     .reset_cause = board_reset_cause,
     .watchdog_kick = board_watchdog_kick,
+    .boot_number = board_boot_number,
     .unique_id = board_unique_id,
     .link_read = board_link_read,
     .link_write = board_link_write,

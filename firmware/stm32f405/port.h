@@ -71,6 +71,7 @@ void system_init(void);
 void watchdog_kick(void);
 enum board_reset system_reset_cause(void);
 int system_supply_mv(void);
+uint32_t system_boot_number(void);
 void system_unique_id(uint8_t id[BOARD_UNIQUE_ID]);
 void system_restart(void) __attribute__((noreturn));
 void system_enter_loader(void) __attribute__((noreturn));

@@ -57,8 +57,8 @@ void f405_complain(struct f405 *chip, const char *format, ...)
     int n = vsnprintf(chip->fault, sizeof chip->fault, format, list);
     va_end(list);
     if (n > 0 && (size_t)n < sizeof chip->fault)
-        snprintf(chip->fault + n, sizeof chip->fault - (size_t)n, " (block at 0x%08x, cycle %llu)", chip->block_address,
-                 (unsigned long long)chip->now);
+        snprintf(chip->fault + n, sizeof chip->fault - (size_t)n, " (block at 0x%08x after 0x%08x, cycle %llu)",
+                 chip->block_address, chip->previous_block, (unsigned long long)chip->now);
     chip->reason = F405_STOP_FAULT;
     chip->attention = true;
 }
@@ -245,6 +245,7 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *use
 {
     struct f405 *chip = user;
     uint32_t address = (uint32_t)address64;
+    chip->previous_block = chip->block_address;
     chip->block_address = address;
     if (chip->flash.fix_size)
         f405_flash_fix(chip);

@@ -92,6 +92,7 @@ struct adc {
     uint32_t sr, cr1, cr2, smpr[2], sqr[3], dr, htr, ltr;
     uint64_t done;
     int rank;
+    bool at_reading;
 };
 
 struct watchdog {
@@ -137,7 +138,7 @@ struct f405 {
     uint64_t instructions;
     bool on, stop, reset_wanted, attention, hook_stopped;
     uint32_t reset_flags; /* RCC_CSR bits of the reset that is wanted */
-    uint32_t resets, block_address;
+    uint32_t resets, block_address, previous_block;
     enum f405_stop reason;
     char fault[256];
     uint64_t random;

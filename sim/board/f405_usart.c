@@ -240,7 +240,9 @@ void f405_adc_event(struct f405 *chip)
     a->rank = last ? 0 : a->rank + 1;
     if (a->cr2 & 1u << 8 && (f405_dma_request(chip, 1, 0, 0) || f405_dma_request(chip, 1, 4, 0)))
         a->sr &= ~(uint32_t)EOC;
-    if (!last || a->cr2 & 2)
+    /* Over and over, and nothing but the data register to tell: that is computed when it is read. */
+    a->at_reading = last && a->cr2 & 2 && !(a->cr2 & 1u << 8) && !(a->cr1 & 0x20) && !bits(a->sqr[0], 20, 4);
+    if (!a->at_reading && (!last || a->cr2 & 2))
         convert(chip);
     adc_interrupts(chip);
 }
@@ -261,6 +263,8 @@ bool f405_adc_access(struct f405 *chip, int index, uint32_t offset, bool write, 
     if (offset > 0x4c || !reg[offset / 4])
         return false;
     if (!write) {
+        if (offset == 0x4c && a->at_reading && chip->ops->adc)
+            a->dr = (uint32_t)chip->ops->adc(chip->context, ranked_channel(a)) & 0xfff;
         *value = *reg[offset / 4];
         if (offset == 0x4c)
             a->sr &= ~(uint32_t)EOC;
