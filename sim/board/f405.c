@@ -1,5 +1,5 @@
 /* The emulated chip as a whole: memory, buses, the order of events, running. */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 #include "proto/base/memory.h"
 

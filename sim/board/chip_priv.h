@@ -1,6 +1,6 @@
 /* What the files of the emulated STM32F405 share. */
-#ifndef LUMI_SIM_BOARD_F405_PRIV_H
-#define LUMI_SIM_BOARD_F405_PRIV_H
+#ifndef LUMI_SIM_BOARD_CHIP_PRIV_H
+#define LUMI_SIM_BOARD_CHIP_PRIV_H
 
 #include "sim/board/f405.h"
 
@@ -172,7 +172,7 @@ void f405_bus_write(struct f405 *chip, uint32_t address, unsigned size, uint32_t
 /* A register behind a peripheral's base, by its number there. */
 bool f405_mmio(struct f405 *chip, uint32_t address, unsigned size, bool write, uint32_t *value);
 
-/* f405_cpu.c: exceptions and the private peripheral bus. */
+/* chip_cpu.c: exceptions and the private peripheral bus. */
 void f405_cpu_reset(struct f405 *chip);
 bool f405_cpu_wakes(const struct f405 *chip);
 void f405_cpu_irq(struct f405 *chip, int irq, bool level);

@@ -1,5 +1,5 @@
 /* The flash interface (RM0090 3): keys, sector erase, programming, errors, and power that goes in between. */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* RCC (RM0090 7), PWR (5), IWDG (21), DBGMCU (38.16), RNG (24), CRC (4). */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* The USARTs (RM0090 30), asynchronous, 8 bits, no parity: bytes take their time on the line, DMA or interrupts move
  * them, a byte that nobody takes overruns. And ADC1 (13): single conversions and sequences, one after another. */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 #include <string.h>
 

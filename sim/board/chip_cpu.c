@@ -1,6 +1,6 @@
 /* The Cortex-M4's exceptions, which Unicorn has none of: NVIC, SysTick, system control block, entry and return.
  * ARM DDI0403E B1.5 (exception model), B3.2 (SCB), B3.3 (SysTick), B3.4 (NVIC); PM0214 4.3 (4 bits of priority). */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* OTG_FS seen from the cable: what it answers to each token (RM0090 34.17, USB 2.0 8.4 to 8.6). */
-#include "sim/board/f405_otg.h"
+#include "sim/board/chip_otg.h"
 
 #include <string.h>
 

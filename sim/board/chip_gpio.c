@@ -1,5 +1,5 @@
 /* GPIO (RM0090 8), EXTI (12) and SYSCFG (9): pins, who drives them, and whom their edges wake. */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 #include <string.h>
 

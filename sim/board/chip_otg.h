@@ -1,8 +1,8 @@
 /* Bits of OTG_FS's registers (RM0090 34.16) and what its two files share. */
-#ifndef LUMI_SIM_BOARD_F405_OTG_H
-#define LUMI_SIM_BOARD_F405_OTG_H
+#ifndef LUMI_SIM_BOARD_CHIP_OTG_H
+#define LUMI_SIM_BOARD_CHIP_OTG_H
 
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 /* GINTSTS */
 #define OTGINT (1u << 2)

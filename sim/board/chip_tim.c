@@ -1,7 +1,7 @@
 /* The timers (RM0090 17 to 20), counting up: update events with preloads and repetition, compare and PWM outputs with
  * exact edges, capture, one-pulse mode, DMA requests. No slave modes, no break, no dead time. A compare match happens
  * when the counter arrives at CCRx; a value that is written when the counter has passed it matches a round later. */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 enum { CEN = 1, UDIS = 2, URS = 4, OPM = 8, ARPE = 0x80 };
 

@@ -1,5 +1,5 @@
-/* OTG_FS as a device (RM0090 34): registers, FIFOs, interrupts. The bus side is in f405_otg_bus.c. */
-#include "sim/board/f405_otg.h"
+/* OTG_FS as a device (RM0090 34): registers, FIFOs, interrupts. The bus side is in chip_otg_bus.c. */
+#include "sim/board/chip_otg.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* DMA1 and DMA2 (RM0090 10): streams of single items between a peripheral and memory, circular or not, both ways.
  * Every request is served at once. No FIFO mode, no bursts, no double buffer. */
-#include "sim/board/f405_priv.h"
+#include "sim/board/chip_priv.h"
 
 enum { EN = 1, DMEIE = 2, TEIE = 4, HTIE = 8, TCIE = 0x10, PFCTRL = 0x20, CIRC = 0x100, PINC = 0x200, MINC = 0x400 };
 
