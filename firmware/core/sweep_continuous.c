@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#define CRUISE_MARGIN 0.05                /* s of cruise before the first exposure and after the last */
 #define RECORD_AHEAD (BOARD_TICK_HZ / 50) /* a record pulse is queued 20 ms ahead */
 #define RETRY_TICKS (BOARD_TICK_HZ / 1000)
 
@@ -46,7 +45,7 @@ void sweep_plan_continuous(struct core *core)
         s->mark = (int)ceil(first / core->steps_per_turn - 1e-9);
         s->marks_end = core->plan.first_turn + core->plan.turns;
     }
-    first -= limits.speed * (half_exposure(core) + CRUISE_MARGIN);
+    first -= limits.speed * (half_exposure(core) + LUMI_PLAN_CRUISE_MARGIN);
     s->start = (int64_t)floor(first) - (run_up > backlash ? run_up : (int64_t)backlash + 1);
 }
 
@@ -55,7 +54,7 @@ static void set_off(struct core *core)
     struct sweep *s = &core->sweep;
     const struct motion_limits limits = sweep_limits(core);
     const double last = video(core) ? (s->marks_end - 1) * core->steps_per_turn : sweep_position(core, last_shot(core));
-    const double end = last + limits.speed * (half_exposure(core) + CRUISE_MARGIN);
+    const double end = last + limits.speed * (half_exposure(core) + LUMI_PLAN_CRUISE_MARGIN);
     const uint64_t lead = video(core) ? 0 : firing_lead(&core->firing, 0);
 
     if (core_move(core, (int64_t)ceil(end) + motion_run_up_steps(&limits), &limits,

@@ -1,7 +1,6 @@
 /* The plan of a sweep: its totals and times. Linked into firmware: no stdio. */
-#include "proto/mechanism/sweep_plan.h"
+#include "proto/mechanism/sweep_plan_priv.h"
 
-#include "proto/mechanism/kinematics.h"
 #include "proto/mechanism/ramp_time.h"
 
 #include <math.h>
@@ -98,6 +97,36 @@ double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi
     return offset;
 }
 
+double plan_position_wait(const struct lumi_plan *plan, const struct lumi_rig *rig)
+{
+    const struct lumi_rig_motion *m = &rig->control.motion;
+    double move = lumi_move_time(2 * LUMI_PI / plan->positions, m->speed_max, m->acceleration_max, m->jerk_max);
+    double lead = 0;
+
+    /* Focus lines and triggers that must be up before the exposure may go up in the move, but not before it. */
+    for (int i = 0; i < rig->camera_count; i++)
+        if (takes_part(plan, rig, i))
+            lead = fmax(lead, rig->control.triggers[i].focus_lead + rig->control.triggers[i].shutter_lag);
+    return fmax(move + lumi_plan_settle(plan, rig), lead);
+}
+
+double plan_bracket_length(const struct lumi_plan *plan, const struct lumi_rig *rig)
+{
+    int last = plan->bracket - 1;
+    double end = plan->exposures[last];
+
+    /* The move waits for the last line to fall, too. */
+    for (int i = 0; i < rig->camera_count; i++)
+        if (takes_part(plan, rig, i))
+            end = fmax(end, rig->control.triggers[i].pulse - rig->control.triggers[i].shutter_lag);
+    return lumi_plan_exposure_offset(plan, rig, last) + end;
+}
+
+double plan_position_busy(const struct lumi_plan *plan, const struct lumi_rig *rig)
+{
+    return plan_position_wait(plan, rig) + plan_bracket_length(plan, rig) + LUMI_PLAN_MOVE_MARGIN;
+}
+
 /* ---- While turning ---- */
 
 double lumi_plan_speed(const struct lumi_plan *plan)
@@ -122,19 +151,27 @@ static double ramp_seconds(const struct lumi_plan *plan, const struct lumi_rig *
 }
 
 /* The speed is held for so long before position 0, and behind the last place. */
-static double lead_seconds(const struct lumi_plan *plan, const struct lumi_rig *rig)
+static double held_seconds(const struct lumi_plan *plan)
 {
-    return fmax(rig->control.motion.settle, longest_exposure(plan));
-}
-
-double lumi_plan_run_up(const struct lumi_plan *plan, const struct lumi_rig *rig)
-{
-    return (ramp_seconds(plan, rig) / 2 + lead_seconds(plan, rig)) / plan->turn_time;
+    return LUMI_PLAN_CRUISE_MARGIN + (plan->mode == LUMI_PLAN_VIDEO ? 0 : plan->exposures[0] / 2);
 }
 
 double lumi_plan_run_down(const struct lumi_plan *plan, const struct lumi_rig *rig)
 {
-    return (ramp_seconds(plan, rig) / 2 + longest_exposure(plan)) / plan->turn_time;
+    return (ramp_seconds(plan, rig) / 2 + held_seconds(plan)) / plan->turn_time;
+}
+
+/* The ramp is longer than the backlash, or the platform turns at speed for the rest of it. */
+static double up_seconds(const struct lumi_plan *plan, const struct lumi_rig *rig)
+{
+    double backlash = rig->control.motion.backlash / lumi_plan_speed(plan);
+
+    return fmax(backlash - ramp_seconds(plan, rig) / 2, 0) + held_seconds(plan);
+}
+
+double lumi_plan_run_up(const struct lumi_plan *plan, const struct lumi_rig *rig)
+{
+    return (ramp_seconds(plan, rig) / 2 + up_seconds(plan, rig)) / plan->turn_time;
 }
 
 double lumi_plan_span(const struct lumi_plan *plan)
@@ -146,13 +183,12 @@ double lumi_plan_span(const struct lumi_plan *plan)
 
 double lumi_plan_seconds(const struct lumi_plan *plan, const struct lumi_rig *rig)
 {
-    int moves = plan->positions * plan->turns - 1, last = plan->bracket - 1;
+    int moves = plan->positions * plan->turns - 1;
 
     if (plan->mode != LUMI_PLAN_START_STOP)
-        return lumi_plan_span(plan) * plan->turn_time + 2 * ramp_seconds(plan, rig) + lead_seconds(plan, rig) +
-               longest_exposure(plan);
-    return moves * lumi_plan_position_seconds(plan) + lumi_plan_settle(plan, rig) +
-           lumi_plan_exposure_offset(plan, rig, last) + plan->exposures[last];
+        return lumi_plan_span(plan) * plan->turn_time + 2 * ramp_seconds(plan, rig) + up_seconds(plan, rig) +
+               held_seconds(plan);
+    return moves * lumi_plan_position_seconds(plan) + plan_position_busy(plan, rig);
 }
 
 double lumi_plan_blur(const struct lumi_plan *plan, const struct lumi_rig *rig)

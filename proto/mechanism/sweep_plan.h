@@ -41,7 +41,9 @@ struct lumi_plan {
 /* The paper's limit: 1/250 s at 12°/s and 20 pixels a degree smear 0.96 of a pixel (Overbeck et al. 2018, section 3).
  */
 #define LUMI_PLAN_BLUR 1.0
-#define LUMI_PLAN_PULSE_GAP 0.005 /* s a trigger line is low between two pulses, at least */
+#define LUMI_PLAN_PULSE_GAP 0.005    /* s a trigger line is low between two pulses, at least */
+#define LUMI_PLAN_CRUISE_MARGIN 0.05 /* s of constant speed before the first exposure and behind the last */
+#define LUMI_PLAN_MOVE_MARGIN 0.02   /* s of a position's time that the board keeps for itself */
 
 /* One turn count, 72 positions, 30 s, continuous, one exposure of 1/250 s, all cameras: what `rig` is meant for. */
 void lumi_plan_init(struct lumi_plan *plan, const struct lumi_rig *rig);
@@ -67,7 +69,8 @@ uint32_t lumi_plan_cameras(const struct lumi_plan *plan, const struct lumi_rig *
 int64_t lumi_plan_position_step(const struct lumi_plan *plan, const struct lumi_rig *rig, int position);
 
 /* Start-stop. Seconds from position to position, from the last step of a move to the first exposure's begin, and from
- * there to the begin of exposure `k` of the bracket. The next move begins position_seconds after the one before. */
+ * there to the begin of exposure `k` of the bracket (k = bracket: until another position's first may begin). The next
+ * move begins position_seconds after the one before. */
 double lumi_plan_position_seconds(const struct lumi_plan *plan);
 double lumi_plan_settle(const struct lumi_plan *plan, const struct lumi_rig *rig);
 double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi_rig *rig, int k);
@@ -75,9 +78,9 @@ double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi
  * a trigger again and its lines have been low. */
 double lumi_plan_exposure_spacing(const struct lumi_plan *plan, const struct lumi_rig *rig, int k);
 
-/* Continuous and video: the platform's speed; where it starts from rest before position 0, and where it may come to
- * rest behind the sweep's last place, in turns. Within the run-up it has reached its speed and then swung out for the
- * profile's settle time. */
+/* Continuous and video: the platform's speed; how far before position 0 it starts from rest and how far behind the
+ * sweep's last place it comes to rest, in turns: the ramp (or the backlash, if that is more) and what it turns at
+ * constant speed besides. */
 double lumi_plan_speed(const struct lumi_plan *plan); /* rad/s */
 double lumi_plan_run_up(const struct lumi_plan *plan, const struct lumi_rig *rig);
 double lumi_plan_run_down(const struct lumi_plan *plan, const struct lumi_rig *rig);

@@ -2,7 +2,7 @@
 #include "proto/mechanism/kinematics.h"
 #include "proto/mechanism/ramp_time.h"
 #include "proto/mechanism/rig_priv.h"
-#include "proto/mechanism/sweep_plan.h"
+#include "proto/mechanism/sweep_plan_priv.h"
 
 #include <math.h>
 
@@ -116,15 +116,14 @@ static int check_turning(const struct lumi_plan *plan, const struct lumi_rig *ri
 static int check_start_stop(const struct lumi_plan *plan, const struct lumi_rig *rig, struct lumi_error *error)
 {
     const struct lumi_rig_motion *m = &rig->control.motion;
-    int last = plan->bracket - 1;
     double move = lumi_move_time(2 * LUMI_PI / plan->positions, m->speed_max, m->acceleration_max, m->jerk_max);
-    double settle = lumi_plan_settle(plan, rig), apart = lumi_plan_position_seconds(plan);
-    double bracket = lumi_plan_exposure_offset(plan, rig, last) + plan->exposures[last];
-    double cameras = lumi_plan_exposure_offset(plan, rig, plan->bracket);
+    double wait = plan_position_wait(plan, rig), busy = plan_position_busy(plan, rig);
+    double apart = lumi_plan_position_seconds(plan), cameras = lumi_plan_exposure_offset(plan, rig, plan->bracket);
 
-    if (move + settle + bracket > apart)
-        RIG_REFUSE("%g s a position: the move takes %g s, settling %g s, the exposures %g s, together %g s", apart,
-                   move, settle, bracket, move + settle + bracket);
+    if (busy > apart)
+        RIG_REFUSE("%g s a position: the move takes %g s, the first exposure begins after %g s, and all is done after "
+                   "%g s",
+                   apart, move, wait, busy);
     if (cameras > apart)
         RIG_REFUSE("%g s a position: the cameras take %d exposures every %g s", apart, plan->bracket, cameras);
     return LUMI_OK;

@@ -23,7 +23,7 @@ can "1296 shots, 2592 frames in 9:0" bar2
 plan "mode = start-stop" "turn_time_s = 60"
 can "1152 frames in" arc16
 plan "mode = start-stop" "position_time_s = 1.5" "exposure_s = 1/60" "stops = -2 0 +2"
-can "3888 shots, 7776 frames in 32:23 min" bar2
+can "3888 shots, 7776 frames in 32:24 min" bar2
 plan "mode = video" "turns = 1"
 can "a video of 1 turn in 0:3" arc16
 

@@ -330,19 +330,47 @@ static void a_move_takes_the_time_that_its_phases_take(void **state)
     }
 }
 
-static void the_run_up_ends_at_speed_and_settled_before_the_first_position(void **state)
+static void the_run_up_is_ramp_and_margin_or_the_backlash(void **state)
 {
     struct lumi_rig rig = builtin("bar2");
     struct lumi_plan plan = plan_for(&rig);
     const struct lumi_rig_motion *m = &rig.control.motion;
 
     (void)state;
-    double v = lumi_plan_speed(&plan), up = lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI;
+    double v = lumi_plan_speed(&plan), ramp = lumi_ramp_distance(v, m->acceleration_max, m->jerk_max);
+    double held = v * (LUMI_PLAN_CRUISE_MARGIN + plan.exposures[0] / 2);
     assert_true(fabs(v - 2 * LUMI_PI / 30) < 1e-12);
-    double held = (up - lumi_ramp_distance(v, m->acceleration_max, m->jerk_max)) / v;
-    assert_true(fabs(held - m->settle) < 1e-9);
-    assert_true(lumi_plan_run_down(&plan, &rig) > 0);
+    assert_true(fabs(lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI - ramp - held) < 1e-9);
+    assert_true(fabs(lumi_plan_run_down(&plan, &rig) * 2 * LUMI_PI - ramp - held) < 1e-9);
     assert_true(fabs(lumi_plan_span(&plan) - (18 - 1 / 72.0)) < 1e-12);
+    double seconds = lumi_plan_seconds(&plan, &rig);
+    rig.control.motion.backlash = 0.2;
+    assert_true(fabs(lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI - 0.2 - held) < 1e-9);
+    assert_true(fabs(lumi_plan_run_down(&plan, &rig) * 2 * LUMI_PI - ramp - held) < 1e-9);
+    assert_true(fabs(lumi_plan_seconds(&plan, &rig) - seconds - (0.2 - ramp) / v) < 1e-9);
+}
+
+/* A position is ready when the cameras' lines have had their lead, and over when the last of them has fallen. */
+static void focus_lines_and_long_pulses_take_their_time_at_a_position(void **state)
+{
+    struct lumi_rig rig = builtin("bar2");
+    struct lumi_plan plan = plan_for(&rig);
+
+    (void)state;
+    plan.mode = LUMI_PLAN_START_STOP;
+    plan.position_time = 1.2;
+    can(&plan, &rig);
+    rig.control.triggers[1].focus_channel = 5;
+    rig.control.triggers[1].focus_lead = 1;
+    assert_int_equal(lumi_rig_check(&rig, NULL), LUMI_OK);
+    can(&plan, &rig);
+    rig.control.triggers[1].focus_lead = 1.15;
+    cannot(&plan, &rig, "the first exposure begins after 1.2 s");
+    rig = builtin("bar2");
+    rig.control.triggers[1].pulse = 0.4;
+    cannot(&plan, &rig, "all is done after 1.28667 s");
+    plan.cameras = 1;
+    can(&plan, &rig);
 }
 
 /* ---- Text ---- */
@@ -464,7 +492,8 @@ int main(void)
         cmocka_unit_test(numbers_that_cannot_be_are_refused),
         cmocka_unit_test(positions_of_a_plan_fall_on_the_nearest_step_without_drift),
         cmocka_unit_test(a_move_takes_the_time_that_its_phases_take),
-        cmocka_unit_test(the_run_up_ends_at_speed_and_settled_before_the_first_position),
+        cmocka_unit_test(the_run_up_is_ramp_and_margin_or_the_backlash),
+        cmocka_unit_test(focus_lines_and_long_pulses_take_their_time_at_a_position),
         cmocka_unit_test(a_plan_that_is_printed_parses_to_the_same_numbers),
         cmocka_unit_test(exposures_are_listed_or_given_by_stops),
         cmocka_unit_test(plans_that_cannot_be_read_are_refused_with_the_line),
