@@ -25,6 +25,7 @@
 #define RCC_BASE 0x40023800u
 #define FLASH_BASE 0x40023c00u
 #define DMA1_BASE 0x40026000u
+#define RNG_BASE 0x50060800u
 
 /* PWR, section 5.4.1 */
 #define PWR_CR REG32(PWR_BASE + 0x00)
@@ -233,11 +234,13 @@
 #define ADC_CCR_ADCPRE_4 (1u << 16)
 
 /* RNG, section 24.4 */
-#define RNG_CR REG32(0x50060800u)
+#define RNG_CR REG32(RNG_BASE + 0x00)
 #define RNG_CR_RNGEN (1u << 2)
-#define RNG_SR REG32(0x50060804u)
+#define RNG_SR REG32(RNG_BASE + 0x04)
 #define RNG_SR_DRDY (1u << 0)
-#define RNG_DR REG32(0x50060808u)
+#define RNG_SR_CECS (1u << 1)
+#define RNG_SR_SECS (1u << 2)
+#define RNG_DR REG32(RNG_BASE + 0x08)
 
 /* Section 39.1: 96 bits; section 2.4, table 2: the loader in system memory. */
 #define UNIQUE_ID_ADDRESS 0x1fff7a10u

@@ -73,24 +73,27 @@ int system_supply_mv(void)
 
 void system_unique_id(uint8_t id[BOARD_UNIQUE_ID])
 {
-    memcpy(id, (const void *)UNIQUE_ID_ADDRESS, BOARD_UNIQUE_ID);
+    if (ON_QEMU)
+        memcpy(id, "netduinoplus", BOARD_UNIQUE_ID); /* there is none */
+    else
+        memcpy(id, (const void *)UNIQUE_ID_ADDRESS, BOARD_UNIQUE_ID);
 }
 
-/* Section 24.3: the noise source, which needs 48 MHz from the PLL; without an answer the time it did not come in. */
+/* Section 24.3: a number takes 40 cycles of the 48 MHz clock; the first after power-up is not used. Should the
+ * generator fail, the noise of the supply's measurement, the time and the number of starts must do. */
 uint32_t system_boot_number(void)
 {
-    uint32_t number = (uint32_t)time_now();
+    uint32_t number = boot_count() * 2654435761u ^ (uint32_t)time_now() * 40503u ^ ADC_DR(ADC1_BASE) << 20;
 
     if (ON_QEMU)
-        return number;
-    RCC_AHB2ENR |= RCC_AHB2ENR_RNGEN;
-    (void)RCC_AHB2ENR;
+        return number; /* its generator is a hole */
     RNG_CR = RNG_CR_RNGEN;
-    for (int word = 0, patience = 1000; word < 2 && patience > 0; patience--)
-        if (RNG_SR & RNG_SR_DRDY) { /* the first one after it is switched on is not used (24.3.1) */
-            number = RNG_DR;
-            word++;
-        }
+    for (int i = 0; i < 3; i++) {
+        for (int wait = 0; !(RNG_SR & RNG_SR_DRDY) && wait < 1000; wait++)
+            ;
+        if (!(RNG_SR & (RNG_SR_CECS | RNG_SR_SECS)))
+            number ^= RNG_DR;
+    }
     RNG_CR = 0;
     return number;
 }

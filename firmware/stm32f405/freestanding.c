@@ -92,7 +92,7 @@ static void put_double(struct text *text, double value)
     uint32_t scale = 1;
     for (int i = 1; i < digits; i++)
         scale *= 10;
-    const bool scientific = lead < -5 || lead >= 6;
+    const bool scientific = lead < -4 || lead >= 6;
     for (int i = scientific ? 0 : lead; i < 0; i++) {
         put(text, '0');
         if (i == lead)

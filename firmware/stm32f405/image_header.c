@@ -1,17 +1,11 @@
 /* What firmware/board/board_image.h says of this image; image_seal fills in size and checksum. */
 #include "firmware/board/board_image.h"
-#include "firmware/stm32f405/pins.h"
+#include "firmware/stm32f405/port.h"
 
 #include <stddef.h>
 
 _Static_assert(sizeof(struct board_image) == 64, "as board_image.h has it");
 _Static_assert(offsetof(struct board_image, firmware) == BOARD_IMAGE_FIRMWARE_AT, "as board_image.h has it");
-
-#ifdef LUMI_BOARD_QEMU
-#define BOARD_NAME "netduinoplus2"
-#else
-#define BOARD_NAME "stm32f405"
-#endif
 
 __attribute__((section(".image_header"), used)) static const struct board_image header = {
     .magic = BOARD_IMAGE_MAGIC,

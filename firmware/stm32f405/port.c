@@ -96,16 +96,16 @@ static void board_watchdog_kick(void *port)
     watchdog_kick();
 }
 
-static uint32_t board_boot_number(void *port)
-{
-    (void)port;
-    return system_boot_number();
-}
-
 static void board_unique_id(void *port, uint8_t id[BOARD_UNIQUE_ID])
 {
     (void)port;
     system_unique_id(id);
+}
+
+static uint32_t board_boot_number(void *port)
+{
+    (void)port;
+    return system_boot_number();
 }
 
 static size_t board_link_read(void *port, enum board_link link, uint8_t *data, size_t size)
@@ -158,7 +158,7 @@ static void board_restart(void *port)
 }
 
 static const struct board board = {
-    .name = "stm32f405",
+    .name = BOARD_NAME,
     .now = board_now,
     .lock = board_lock,
     .unlock = board_unlock,
@@ -174,8 +174,8 @@ static const struct board board = {
     .supply_mv = board_supply_mv,
     .reset_cause = board_reset_cause,
     .watchdog_kick = board_watchdog_kick,
-    .boot_number = board_boot_number,
     .unique_id = board_unique_id,
+    .boot_number = board_boot_number,
     .link_read = board_link_read,
     .link_write = board_link_write,
     .link_up = board_link_up,

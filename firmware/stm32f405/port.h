@@ -6,12 +6,14 @@
 #include "firmware/stm32f405/pins.h"
 #include "proto/wire/transport.h"
 
-/* QEMU's netduinoplus2 lacks what its variant of the image leaves out: a PLL that gets ready, DMA, a watchdog, the
- * USB core; and its timers run at 1 GHz. Nothing else differs. */
+/* QEMU's netduinoplus2 lacks what its variant of the image leaves out: a PLL that gets ready, DMA, a watchdog,
+ * the USB core, a noise source, a unique ID; and its timers run at 1 GHz. Nothing else differs. */
 #ifdef LUMI_BOARD_QEMU
 #define ON_QEMU 1
+#define BOARD_NAME "netduinoplus2"
 #else
 #define ON_QEMU 0
+#define BOARD_NAME "stm32f405"
 #endif
 
 struct core;
@@ -19,6 +21,7 @@ struct core;
 /* startup.c */
 /* Steps and triggers stop, nothing else goes on; the watchdog starts the chip again. Does not return. */
 void panic(void) __attribute__((noreturn));
+uint32_t boot_count(void); /* starts since power came, as far as RAM remembers; otherwise anything */
 void loader_request(void); /* the next reset goes to the chip's loader */
 
 /* f405_clock.c */

@@ -14,6 +14,7 @@ int main(void);
 
 /* Survives a reset. Two words, so that what RAM holds after power-up is not taken for it. */
 static volatile uint32_t loader_magic[2] __attribute__((section(".magic")));
+static volatile uint32_t starts __attribute__((section(".magic")));
 #define LOADER_MAGIC0 0x4c6f6164u
 #define LOADER_MAGIC1 0x65724446u
 
@@ -21,6 +22,11 @@ void loader_request(void)
 {
     loader_magic[0] = LOADER_MAGIC0;
     loader_magic[1] = LOADER_MAGIC1;
+}
+
+uint32_t boot_count(void)
+{
+    return starts;
 }
 
 /* Into system memory, as after a reset with BOOT0 high: no clock has been touched and no interrupt is on. It expects
@@ -44,6 +50,7 @@ void Reset_Handler(void)
         loader_enter();
     }
     loader_magic[0] = 0;
+    starts = starts + 1;
     SCB_VTOR = FLASH_IMAGE_ADDRESS;
 
     const uint32_t *from = data_load;
