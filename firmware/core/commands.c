@@ -51,11 +51,6 @@ bool core_refuse_unless_rest(const struct core *core, lumi_wire_Reply *reply)
     return true;
 }
 
-static bool external(const struct core *core)
-{
-    return core->has_profile && core->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL;
-}
-
 static void home(struct core *core, const lumi_wire_Home *home_command, lumi_wire_Reply *reply)
 {
     const struct lumi_rig_safety *fitted = &core->rig.control.safety;
@@ -70,7 +65,7 @@ static void home(struct core *core, const lumi_wire_Home *home_command, lumi_wir
         core_refuse(reply, lumi_wire_Result_BAD, "home: the rig has no such turn");
         return;
     }
-    if (external(core)) {
+    if (core_external(core)) {
         /* The drive homes itself, by the host's command: the board takes its word. */
         motion_set_position(&core->motion, llround(home_command->turn * core->steps_per_turn));
         core_state_event(core, EVENT_HOME);
@@ -95,7 +90,7 @@ static void jog(struct core *core, const lumi_wire_Jog *jog_command, lumi_wire_R
 
     if (!allowed(core, EVENT_JOG, "jog", reply))
         return;
-    if (external(core)) {
+    if (core_external(core)) {
         core_refuse(reply, lumi_wire_Result_UNSUPPORTED, "jog: the drive is not the board's");
         return;
     }
@@ -146,7 +141,7 @@ static void start_sweep(struct core *core, const lumi_wire_StartSweep *start, lu
 {
     if (!allowed(core, EVENT_START, "start", reply) || !plan_named(core, start->plan_crc, reply))
         return;
-    if (external(core)) {
+    if (core_external(core)) {
         core_refuse(reply, lumi_wire_Result_UNSUPPORTED, "start: the host moves the drive and asks for each position");
         return;
     }
@@ -164,7 +159,7 @@ static void fire_here(struct core *core, const lumi_wire_FireHere *fire, lumi_wi
 {
     if (!allowed(core, EVENT_FIRE, "fire", reply))
         return;
-    if (!external(core)) {
+    if (!core_external(core)) {
         core_refuse(reply, lumi_wire_Result_UNSUPPORTED, "fire: only with an external drive");
         return;
     }

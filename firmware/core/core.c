@@ -27,12 +27,21 @@ struct motion_limits core_limits(const struct core *core, double speed)
 
 bool core_move(struct core *core, int64_t target, const struct motion_limits *limits, uint64_t at)
 {
-    if (core->safety.standing != 0 || motion_halted(&core->motion))
+    uint32_t standing = core->safety.standing;
+
+    if (core->sweep.active && core->sweep.intent == SWEEP_TO_ROW_END)
+        standing &= ~(1u << LUMI_RIG_FAULT_HOST_LOST); /* its reaction is to go on */
+    if (standing != 0 || motion_halted(&core->motion))
         return false;
     if (motion_start(&core->motion, target, limits, at))
         return true;
     safety_raise(core, LUMI_RIG_FAULT_INTERNAL, "a move could not begin");
     return false;
+}
+
+bool core_external(const struct core *core)
+{
+    return core->has_profile && core->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL;
 }
 
 void core_state_event(struct core *core, enum state_event event)
@@ -53,10 +62,14 @@ void core_state_event(struct core *core, enum state_event event)
 
 void core_rest(struct core *core)
 {
+    /* Marks or turns that did not come as they should: wherever the platform is, it is not where its steps say. */
+    if (core->safety.standing &
+        (1u << LUMI_RIG_FAULT_INDEX_MISSED | 1u << LUMI_RIG_FAULT_INDEX_EARLY | 1u << LUMI_RIG_FAULT_OVERSPEED))
+        motion_forget(&core->motion);
     const bool known = motion_known(&core->motion);
 
     firing_poll(&core->firing); /* what was broken off is told first */
-    core->waiting = core->begun = false;
+    core->begun = false;
     if (core->sweep.active) {
         core->sweep.active = false;
         lamp_off(&core->lamp);
@@ -70,7 +83,6 @@ void core_rest(struct core *core)
 
 void core_stop_soon(struct core *core, bool finish)
 {
-    core->waiting = false;
     if (core->sweep.active) {
         lumi_wire_SweepEnded_How how = core->safety.standing & 1u << LUMI_RIG_FAULT_HOST_LOST
                                            ? lumi_wire_SweepEnded_How_HOST_LOST
@@ -92,6 +104,8 @@ static void poll_activity(struct core *core)
 {
     const char *reason = "";
 
+    if (core_external(core) && motion_known(&core->motion) && core->safety.standing == 0)
+        drop_string_ready(core); /* the host may move the drive whenever it likes */
     switch (core->state) {
     case lumi_wire_State_HOMING:
         if (!core->begun) {
@@ -121,8 +135,8 @@ static void poll_activity(struct core *core)
             core_rest(core);
         return;
     case lumi_wire_State_STOPPING:
-        if (homing_active(&core->homing))
-            homing_poll(&core->homing, &reason);
+        if (homing_active(&core->homing) && homing_poll(&core->homing, &reason) != HOMING_RUNNING)
+            core_report_homed(core, false, "stopped");
         if (!core->sweep.active && !motion_moving(&core->motion) && !homing_active(&core->homing) &&
             !firing_busy_now(&core->firing))
             core_rest(core);
@@ -234,6 +248,11 @@ void core_poll(struct core *core)
     lamp_poll(&core->lamp);
     drop_string_poll(core);
     motion_poll(&core->motion);
+    bool well = core->has_profile && core->safety.standing == 0;
+    if (well != core->lit) {
+        core->lit = well;
+        core->board->output(core->board->port, BOARD_OUT_STATUS, well);
+    }
 }
 
 static uint64_t sooner(uint64_t a, uint64_t b)

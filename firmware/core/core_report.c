@@ -147,7 +147,7 @@ void core_report_note(struct core *core, const char *text)
 
 void core_status(void *context, lumi_wire_Status *status)
 {
-    const struct core *core = context;
+    struct core *core = context;
     const double speed = motion_speed(&core->motion, core->now);
 
     status->state = core->state;

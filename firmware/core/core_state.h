@@ -44,12 +44,13 @@ struct core {
     struct sweep sweep;
 
     /* Home and Jog, until the brake is open and they begin. */
-    bool waiting, begun;
+    bool begun;
     enum homing_goal home_goal;
     int32_t home_turn;
     int64_t jog_target;
     struct motion_limits jog_limits;
 
+    bool lit; /* the status lamp: a profile, and no fault */
     struct lumi_wire_server server;
     lumi_wire_Event event; /* being made */
     /* Profiles are loaded while nothing is fired: a message being decoded and the queued edges share their room. What
@@ -76,6 +77,7 @@ void core_load_profile(struct core *core);
 bool core_move(struct core *core, int64_t target, const struct motion_limits *limits, uint64_t at);
 /* The profile's limits in steps, with the speed given (rad/s). */
 struct motion_limits core_limits(const struct core *core, double speed);
+bool core_external(const struct core *core);
 double core_pitch(const struct core *core, double step);
 
 /* core_report.c: events, and the status. */

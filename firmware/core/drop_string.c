@@ -118,7 +118,8 @@ void drop_string_poll(struct core *core)
     if (!state_at_rest(core->state)) {
         s->rest_at = now;
         s->resting = true;
-    } else if (s->resting && s->open && now >= s->rest_at + DROP_STRING_REST_TICKS) {
+    } else if (s->resting && s->open && !(core_external(core) && s->enabled) &&
+               now >= s->rest_at + DROP_STRING_REST_TICKS) {
         set_brake(core, false);
         s->resting = false;
     }

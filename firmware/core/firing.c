@@ -69,6 +69,8 @@ static void set_state(struct firing *firing, uint32_t number, enum shot_state st
 
     if (number >= LUMI_PLAN_SHOTS_MAX || old == state)
         return;
+    if (state == SHOT_PLANNED && number < firing->first_planned)
+        firing->first_planned = number;
     firing->fired += (state == SHOT_FIRED) - (old == SHOT_FIRED);
     firing->lost += (state == SHOT_LOST) - (old == SHOT_LOST);
     unsigned shift = number % 4 * 2;
@@ -79,6 +81,13 @@ void firing_plan_again(struct firing *firing, uint32_t first, uint32_t count)
 {
     for (uint32_t i = 0; i < count && first + i < LUMI_PLAN_SHOTS_MAX; i++)
         set_state(firing, first + i, SHOT_PLANNED);
+}
+
+uint32_t firing_next_planned(struct firing *firing)
+{
+    while (firing->first_planned < LUMI_PLAN_SHOTS_MAX && firing_state(firing, firing->first_planned) != SHOT_PLANNED)
+        firing->first_planned++;
+    return firing->first_planned;
 }
 
 void firing_count(const struct firing *firing, uint32_t *fired, uint32_t *lost)

@@ -74,6 +74,8 @@ bool firing_busy_now(const struct firing *firing); /* lines are up or queued, or
 enum shot_state firing_state(const struct firing *firing, uint32_t number);
 /* Queued or under way: its state is still to come. */
 bool firing_pending(const struct firing *firing, uint32_t number);
+/* The first shot that is PLANNED, or LUMI_PLAN_SHOTS_MAX. */
+uint32_t firing_next_planned(struct firing *firing);
 void firing_count(const struct firing *firing, uint32_t *fired, uint32_t *lost);
 /* One pattern outside a sweep: each channel of `cameras` alone, one after another; `exposure` and `gap` in seconds.
  * False: something is under way, or no such camera is wired. */

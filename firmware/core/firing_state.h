@@ -57,6 +57,7 @@ struct firing {
     uint64_t exposures[LUMI_PLAN_BRACKET];
     uint8_t camera_of_channel[LUMI_RIG_CHANNELS];
     uint32_t fired, lost;
+    uint32_t first_planned; /* none before it is */
     uint8_t states[LUMI_PLAN_SHOTS_MAX / 4];
     /* Shared with the interrupt, under lock. A ring of edges in order of time. */
     struct firing_edge *edges; /* FIRING_EDGES, the owner's; not touched while nothing is queued */

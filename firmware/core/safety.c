@@ -1,10 +1,12 @@
 /* The fault table at work. */
 #include "firmware/core/core_state.h"
 
+#include <math.h>
+
 #define SUPPLY_PERIOD (BOARD_TICK_HZ / 100)
-#define SUPPLY_READINGS 5      /* 50 ms below the minimum */
-#define SUPPLY_HYSTERESIS 1.03 /* cleared from so much above it */
-#define INDEX_BOUNCE (BOARD_TICK_HZ / 20)
+#define SUPPLY_READINGS 5                 /* 50 ms below the minimum */
+#define SUPPLY_HYSTERESIS 1.03            /* cleared from so much above it */
+#define WATCH_PERIOD (BOARD_TICK_HZ / 50) /* longer than debouncing and a poll */
 #define SPEED_TOLERANCE 1.02
 
 #define BIT(fault) (1u << (fault))
@@ -21,11 +23,6 @@ static uint64_t debounce_ticks(int input)
     return (uint64_t)debounce_ms[input] * (BOARD_TICK_HZ / 1000);
 }
 
-static bool external(const struct core *core)
-{
-    return core->has_profile && core->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL;
-}
-
 void safety_init(struct core *core)
 {
     struct safety *s = &core->safety;
@@ -37,6 +34,17 @@ void safety_init(struct core *core)
         s->inputs[i] = s->raw[i] = board->input(board->port, (enum board_input)i);
         s->changed[i] = now;
     }
+    debounce_init(&s->index, s->raw[BOARD_IN_INDEX]);
+}
+
+void safety_watch_index(struct core *core)
+{
+    struct safety *s = &core->safety;
+
+    s->watching = core->rig.control.motion.index_window > 0;
+    s->watched = motion_position(&core->motion);
+    s->watch_due = core->now + WATCH_PERIOD;
+    index_watch_begin(&s->watch, &core->rig, s->watched);
 }
 
 /* What a fault does. Without a profile, or where it says what cannot be for an emergency stop: halted, lines down. */
@@ -55,7 +63,7 @@ static struct lumi_rig_reaction reaction(const struct core *core, enum lumi_rig_
 static void stop_now(struct core *core)
 {
     motion_halt(&core->motion);
-    if (external(core))
+    if (core_external(core))
         core->board->output(core->board->port, BOARD_OUT_ENABLE, false);
     if (reaction(core, LUMI_RIG_FAULT_ESTOP).triggers == LUMI_RIG_TRIGGERS_OFF)
         firing_stop(&core->firing, false);
@@ -68,10 +76,8 @@ void safety_on_input(struct core *core, enum board_input input, bool active, uin
     if (input == BOARD_IN_ESTOP && active) {
         s->estop_seen = true;
         stop_now(core);
-    } else if (input == BOARD_IN_INDEX && active) {
-        s->index_at = at;
-        s->index_step = motion_position(&core->motion);
-        s->index_seen = true;
+    } else if (input == BOARD_IN_INDEX) {
+        debounce_input(&s->index, active, motion_position(&core->motion), at);
     }
 }
 
@@ -85,7 +91,7 @@ static void halt(struct core *core, bool off)
 {
     homing_cancel(&core->homing);
     motion_halt(&core->motion);
-    if (external(core)) {
+    if (core_external(core)) {
         drop_string_close(core);
         core->string.enabled = false;
         core->board->output(core->board->port, BOARD_OUT_ENABLE, false);
@@ -110,6 +116,7 @@ static void react(struct core *core, enum lumi_rig_fault fault)
         halt(core, r.motor == LUMI_RIG_MOTOR_OFF);
     if (knew && !motion_known(&core->motion))
         firing_spoil(&core->firing);
+    core->safety.watching = false;
     if (r.brake && !motion_moving(&core->motion))
         drop_string_close(core);
     if (state_at_rest(core->state)) {
@@ -165,7 +172,7 @@ const char *safety_clear(struct core *core, uint32_t faults)
         if ((faults & BIT(i)) && cause(core, i))
             return cause(core, i);
     s->standing = 0;
-    s->index_before = 0;
+    s->marked.active = false;
     /* A stop pressed meanwhile raises itself again: its interrupt sets estop_seen. */
     motion_release(&core->motion);
     if (s->estop_seen)
@@ -230,39 +237,63 @@ static void watch_supply(struct core *core)
         safety_raise(core, LUMI_RIG_FAULT_SUPPLY, "the supply is low");
 }
 
-/* The platform's own speed, by the time between two leading edges of the index mark in one direction; and the speed
- * that was planned, which no planner of ours exceeds. */
+static void tell_verdict(struct core *core, enum index_verdict verdict)
+{
+    if (verdict == INDEX_MISSED)
+        safety_raise(core, LUMI_RIG_FAULT_INDEX_MISSED, "the index mark did not come");
+    else if (verdict == INDEX_EARLY)
+        safety_raise(core, LUMI_RIG_FAULT_INDEX_EARLY, "the index mark came where it should not");
+}
+
+/* The platform's own speed, by the time between two index marks a turn apart. */
+static void watch_turn(struct core *core, const struct debounce_edge *edge)
+{
+    struct safety *s = &core->safety;
+    const int64_t apart = edge->position - s->marked.position;
+    const double limit = core->rig.control.safety.overspeed;
+
+    if (s->marked.active && limit > 0 && fabs((double)apart) > core->steps_per_turn / 2 &&
+        !homing_active(&core->homing) && (double)(edge->at - s->marked.at) * limit < 2 * LUMI_PI * BOARD_TICK_HZ)
+        safety_raise(core, LUMI_RIG_FAULT_OVERSPEED, "a turn took less time than it may");
+    s->marked = *edge;
+}
+
+static void watch_index(struct core *core)
+{
+    struct safety *s = &core->safety;
+    const struct board *board = core->board;
+    struct debounce_edge edge;
+    unsigned lock = board->lock(board->port);
+    bool changed = debounce_poll(&s->index, core->now, &edge);
+
+    board->unlock(board->port, lock);
+    if (changed && edge.active) {
+        watch_turn(core, &edge);
+        if (s->watching)
+            tell_verdict(core, index_watch_edge(&s->watch, edge.position));
+    }
+    if (!s->watching || core->now < s->watch_due)
+        return;
+    if (state_at_rest(core->state)) {
+        s->watching = false;
+        return;
+    }
+    tell_verdict(core, index_watch_position(&s->watch, s->watched));
+    s->watched = motion_position(&core->motion);
+    s->watch_due = core->now + WATCH_PERIOD;
+}
+
+/* No planner of ours goes faster than the profile allows; should it, that is seen. */
 static void watch_speed(struct core *core)
 {
     struct safety *s = &core->safety;
-    const struct lumi_rig_control *control = &core->rig.control;
-    const double per_radian = core->steps_per_turn / (2 * LUMI_PI);
+    const double most = core->rig.control.motion.speed_max * core->steps_per_turn / (2 * LUMI_PI);
 
-    if (core->now >= s->speed_due) {
-        const double speed = motion_speed(&core->motion, core->now);
-        s->speed_due = core->now + SUPPLY_PERIOD;
-        if ((speed < 0 ? -speed : speed) > control->motion.speed_max * per_radian * SPEED_TOLERANCE + 1)
-            safety_raise(core, LUMI_RIG_FAULT_OVERSPEED, "planned faster than the profile allows");
-    }
-    if (!s->index_seen)
+    if (core->now < s->speed_due || !motion_moving(&core->motion))
         return;
-    const struct board *board = core->board;
-    unsigned lock = board->lock(board->port);
-    uint64_t at = s->index_at;
-    int64_t step = s->index_step;
-    s->index_seen = false;
-    board->unlock(board->port, lock);
-
-    if (s->index_before != 0 && at < s->index_before + INDEX_BOUNCE)
-        return;
-    int64_t apart = step - s->index_step_before;
-    bool turned = (apart < 0 ? -apart : apart) > core->steps_per_turn / 2;
-    double limit = control->safety.overspeed;
-    if (s->index_before != 0 && turned && limit > 0 && !homing_active(&core->homing) &&
-        (double)(at - s->index_before) * limit < 2 * LUMI_PI * BOARD_TICK_HZ)
-        safety_raise(core, LUMI_RIG_FAULT_OVERSPEED, "a turn took less time than it may");
-    s->index_before = at;
-    s->index_step_before = step;
+    s->speed_due = core->now + SUPPLY_PERIOD;
+    if (fabs(motion_speed(&core->motion, core->now)) > most * SPEED_TOLERANCE + 1)
+        safety_raise(core, LUMI_RIG_FAULT_OVERSPEED, "planned faster than the profile allows");
 }
 
 static void watch_host(struct core *core)
@@ -287,8 +318,8 @@ void safety_poll(struct core *core)
         return;
     watch_switches(core);
     watch_supply(core);
-    if (motion_moving(&core->motion) || s->index_seen)
-        watch_speed(core);
+    watch_index(core);
+    watch_speed(core);
     watch_host(core);
     if (motion_starved(&core->motion))
         safety_raise(core, LUMI_RIG_FAULT_INTERNAL, "the steps ran out: the main loop was late");
@@ -301,6 +332,10 @@ uint64_t safety_next_poll(const struct core *core)
 
     if (s->estop_seen)
         return core->now;
+    if (s->watching && s->watch_due < next)
+        next = s->watch_due;
+    if (s->index.bouncing && s->index.latest + DEBOUNCE_TICKS < next)
+        next = s->index.latest + DEBOUNCE_TICKS;
     for (int i = 0; i < BOARD_INPUTS; i++)
         if (s->raw[i] != s->inputs[i] && s->changed[i] + debounce_ticks(i) < next)
             next = s->changed[i] + debounce_ticks(i);

@@ -7,7 +7,8 @@
 #ifndef LUMI_FIRMWARE_CORE_SAFETY_H
 #define LUMI_FIRMWARE_CORE_SAFETY_H
 
-#include "firmware/board/board.h"
+#include "firmware/core/debounce.h"
+#include "firmware/core/index_watch.h"
 #include "proto/mechanism/rig.h"
 
 struct core;
@@ -15,11 +16,12 @@ struct core;
 struct safety {
     uint32_t standing;           /* bit a fault */
     volatile bool estop_seen;    /* by the interrupt, until the fault is raised */
-    volatile bool index_seen;    /* the last leading edge of the index mark … */
-    volatile uint64_t index_at;  /* … its tick … */
-    volatile int64_t index_step; /* … and the step it fell on */
-    uint64_t index_before;       /* the edge before that, for the time between them; 0: none */
-    int64_t index_step_before;
+    struct debounce index;       /* shared with the interrupt, under lock */
+    struct debounce_edge marked; /* the last index mark, for the time between them; `active`: there is one */
+    struct index_watch watch;
+    bool watching;   /* marks must come where they should: a sweep is under way */
+    int64_t watched; /* position at watch_due, told once edges up to there have been */
+    uint64_t watch_due;
     bool inputs[BOARD_INPUTS]; /* debounced */
     bool raw[BOARD_INPUTS];
     uint64_t changed[BOARD_INPUTS]; /* of raw */
@@ -37,6 +39,8 @@ void safety_heartbeat(struct core *core);
 void safety_raise(struct core *core, enum lumi_rig_fault fault, const char *text);
 /* NULL: cleared; otherwise why not. */
 const char *safety_clear(struct core *core, uint32_t faults);
+/* A sweep sets off, with rising steps only, until it rests: index marks are held to their places. */
+void safety_watch_index(struct core *core);
 /* Interrupt. */
 void safety_on_input(struct core *core, enum board_input input, bool active, uint64_t at);
 

@@ -25,13 +25,12 @@ void sweep_skip(struct core *core)
         s->shot++;
 }
 
-uint32_t sweep_next_shot(const struct core *core)
+uint32_t sweep_next_shot(struct core *core)
 {
-    uint32_t shots = core->has_plan ? (uint32_t)lumi_plan_shots(&core->plan) : 0, shot = 0;
+    const uint32_t shots = core->has_plan ? (uint32_t)lumi_plan_shots(&core->plan) : 0;
+    const uint32_t next = firing_next_planned(&core->firing);
 
-    while (shot < shots && firing_state(&core->firing, shot) != SHOT_PLANNED)
-        shot++;
-    return shot;
+    return next < shots ? next : shots;
 }
 
 void sweep_wake(struct core *core, uint64_t at)
@@ -126,7 +125,7 @@ const char *sweep_begin(struct core *core, uint32_t first_shot, bool only_missin
     if (why)
         return why;
     s->phase = SWEEP_WIND;
-    s->full_wound = core->plan.wind != LUMI_PLAN_WIND_FULL;
+    s->full_wound = core->plan.wind != LUMI_PLAN_WIND_FULL || first_shot > 0 || only_missing;
     s->how = lumi_wire_SweepEnded_How_COMPLETE;
     s->active = true;
     s->wake = 0;
@@ -151,8 +150,9 @@ static void poll_wind(struct core *core)
         sweep_wake(core, core->now + BOARD_TICK_HZ / 100);
         return;
     }
-    int64_t up = s->start - llround(floor(s->start / core->steps_per_turn) * core->steps_per_turn);
-    int64_t target = s->full_wound ? s->start : (up > 0 ? up - llround(core->steps_per_turn) : up);
+    /* All the way up: where a sweep from turn 0 would begin. */
+    const int64_t up = s->start - llround(core->plan.first_turn * core->steps_per_turn);
+    const int64_t target = s->full_wound ? s->start : up;
     const int64_t position = motion_position(&core->motion);
     if (position == target || (!s->full_wound && position < target)) {
         if (s->full_wound) {
@@ -160,6 +160,7 @@ static void poll_wind(struct core *core)
                        : core->plan.mode == LUMI_PLAN_START_STOP ? SWEEP_MOVE
                                                                  : SWEEP_RUN;
             s->until = 0;
+            safety_watch_index(core);
             core_state_event(core, EVENT_AT_START);
         }
         s->full_wound = true;

@@ -70,7 +70,7 @@ void sweep_break(struct core *core, lumi_wire_SweepEnded_How how);
 /* Goes on to the end of the row it is in; false: it is in none. */
 bool sweep_end_with_row(struct core *core);
 /* The first shot that is neither fired nor lost, or how many there are. */
-uint32_t sweep_next_shot(const struct core *core);
+uint32_t sweep_next_shot(struct core *core);
 
 /* Between sweep.c and the modes: sweep_continuous.c (video too), sweep_start_stop.c (external drive too). */
 double sweep_position(const struct core *core, uint32_t shot); /* steps */

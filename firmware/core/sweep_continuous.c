@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#define CRUISE_MARGIN 0.05                /* s of cruise before the first exposure and after the last */
 #define RECORD_AHEAD (BOARD_TICK_HZ / 50) /* a record pulse is queued 20 ms ahead */
 #define RETRY_TICKS (BOARD_TICK_HZ / 1000)
 
@@ -21,23 +22,16 @@ static uint32_t last_shot(const struct core *core)
     return last;
 }
 
-static double half_exposure(const struct core *core)
-{
-    return video(core) ? 0 : core->plan.exposures[0] / 2;
-}
-
-/* From where: far enough before the first exposure to be at speed and to have taken up the backlash. */
+/* From where: far enough before the first exposure to be at speed, to have swung out and taken up the backlash. */
 void sweep_plan_continuous(struct core *core)
 {
     struct sweep *s = &core->sweep;
-    const struct motion_limits limits = sweep_limits(core);
-    const double backlash = core->rig.control.motion.backlash * core->steps_per_turn / (2 * LUMI_PI);
-    const int64_t run_up = motion_run_up_steps(&limits);
-    const int first_turn = core->plan.first_turn + (video(core) ? s->turns_done : 0);
+    const double backlash = core->rig.control.motion.backlash / (2 * LUMI_PI);
+    const double run_up = fmax(lumi_plan_run_up(&core->plan, &core->rig), backlash);
     double first;
 
     if (video(core)) {
-        s->mark = first_turn;
+        s->mark = core->plan.first_turn + s->turns_done;
         s->marks_end = core->plan.first_turn + core->plan.turns + 1;
         first = s->mark * core->steps_per_turn;
     } else {
@@ -45,21 +39,22 @@ void sweep_plan_continuous(struct core *core)
         s->mark = (int)ceil(first / core->steps_per_turn - 1e-9);
         s->marks_end = core->plan.first_turn + core->plan.turns;
     }
-    first -= limits.speed * (half_exposure(core) + LUMI_PLAN_CRUISE_MARGIN);
-    s->start = (int64_t)floor(first) - (run_up > backlash ? run_up : (int64_t)backlash + 1);
+    s->start = (int64_t)floor(first - run_up * core->steps_per_turn) - 1;
 }
 
-static void set_off(struct core *core)
+/* The first shots' lines may have to go up before the first step. */
+static bool set_off(struct core *core)
 {
     struct sweep *s = &core->sweep;
     const struct motion_limits limits = sweep_limits(core);
     const double last = video(core) ? (s->marks_end - 1) * core->steps_per_turn : sweep_position(core, last_shot(core));
-    const double end = last + limits.speed * (half_exposure(core) + LUMI_PLAN_CRUISE_MARGIN);
+    const double end = last + lumi_plan_run_down(&core->plan, &core->rig) * core->steps_per_turn;
     const uint64_t lead = video(core) ? 0 : firing_lead(&core->firing, 0);
 
-    if (core_move(core, (int64_t)ceil(end) + motion_run_up_steps(&limits), &limits,
-                  core->now + CORE_START_TICKS + lead))
-        s->until = BOARD_NEVER; /* under way */
+    if (!core_move(core, (int64_t)ceil(end), &limits, core->now + CORE_START_TICKS + lead))
+        return false;
+    s->until = BOARD_NEVER; /* under way */
+    return true;
 }
 
 /* Queues the shots whose time has come near. */
@@ -86,7 +81,7 @@ static void feed(struct core *core)
     }
 }
 
-/* The lamp is told ahead, so that its first edge is not a poll late. */
+/* Turn marks as they are passed: a poll late at most. */
 static void pass_marks(struct core *core)
 {
     struct sweep *s = &core->sweep;
@@ -132,8 +127,8 @@ static void poll_run(struct core *core)
         sweep_wake(core, motion_end(&core->motion));
         return;
     }
-    if (firing_busy_now(&core->firing))
-        return; /* firing_poll wakes us */
+    if (firing_busy_now(&core->firing) || (s->intent != SWEEP_TO_REST && s->shot < s->end))
+        return; /* firing_poll wakes us, or the feed does */
     if (video(core)) {
         s->phase = SWEEP_UNRECORD;
         s->until = 0;
@@ -198,8 +193,8 @@ void sweep_poll_continuous(struct core *core)
         poll_unrecord(core);
         break;
     default:
-        if (s->until != BOARD_NEVER && s->intent == SWEEP_GO)
-            set_off(core);
+        if (s->until != BOARD_NEVER && s->intent == SWEEP_GO && !set_off(core))
+            return;
         poll_run(core);
     }
 }

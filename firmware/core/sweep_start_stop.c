@@ -7,12 +7,12 @@
 
 static int64_t stand(const struct core *core, uint32_t shot)
 {
-    return llround(sweep_position(core, shot));
+    return lumi_plan_position_step(&core->plan, &core->rig, (int)(shot / (uint32_t)core->plan.bracket));
 }
 
 static uint64_t settle_ticks(const struct core *core)
 {
-    return CORE_SECONDS(core->plan.settle < 0 ? core->rig.control.motion.settle : core->plan.settle);
+    return CORE_SECONDS(lumi_plan_settle(&core->plan, &core->rig));
 }
 
 /* The first position is approached in the sweep's direction, from as far as the backlash takes. */
@@ -23,7 +23,7 @@ void sweep_plan_start_stop(struct core *core)
     const double backlash = core->rig.control.motion.backlash * core->steps_per_turn / (2 * LUMI_PI);
 
     s->start = stand(core, s->shot) - (int64_t)ceil(backlash) - 1;
-    s->period = CORE_SECONDS(plan->position_time > 0 ? plan->position_time : plan->turn_time / plan->positions);
+    s->period = CORE_SECONDS(lumi_plan_position_seconds(plan));
     s->mark = (int)ceil(sweep_position(core, s->shot) / core->steps_per_turn - 1e-9);
     s->marks_end = plan->first_turn + plan->turns;
 }
@@ -84,6 +84,14 @@ static bool shoot(struct core *core)
     return true;
 }
 
+/* When the last exposure that was queued is over. */
+static uint64_t exposed(const struct core *core)
+{
+    const struct sweep *s = &core->sweep;
+
+    return s->exposure < 0 ? 0 : s->middle + firing_half(&core->firing, s->exposure) + 1;
+}
+
 /* Sets off to the next position that wants a shot. */
 static void move(struct core *core)
 {
@@ -91,19 +99,20 @@ static void move(struct core *core)
 
     sweep_skip(core);
     if (s->shot >= s->end || s->intent == SWEEP_TO_REST) {
-        sweep_done(core);
+        if (!firing_busy_now(&core->firing)) /* firing_poll wakes us */
+            sweep_done(core);
         return;
     }
+    /* Not before the last exposure's end, and not before its time; what is late becomes the new beat. */
     const int64_t target = stand(core, s->shot);
-    uint64_t at = core->now + CORE_START_TICKS;
-    if (s->cycle == 0 || s->cycle < core->now)
+    const uint64_t soonest = core->now + CORE_START_TICKS, over = exposed(core);
+    uint64_t at = over > soonest ? over : soonest;
+    if (s->cycle < at)
         s->cycle = at;
-    if (s->cycle > at) {
-        if (s->cycle > at + CORE_START_TICKS) {
-            sweep_wake(core, s->cycle - CORE_START_TICKS);
-            return;
-        }
-        at = s->cycle;
+    at = s->cycle;
+    if (at > soonest + CORE_START_TICKS) {
+        sweep_wake(core, at - CORE_START_TICKS);
+        return;
     }
     const struct motion_limits limits = sweep_limits(core);
     if (motion_position(&core->motion) != target) {
@@ -143,17 +152,22 @@ static void poll_shoot(struct core *core)
         }
         return;
     }
-    if (!shoot(core) || firing_busy_now(&core->firing))
+    if (!shoot(core))
         return;
     if (motion_moving(&core->motion)) {
         sweep_wake(core, motion_end(&core->motion));
         return;
     }
-    s->phase = SWEEP_MOVE;
-    if (s->external)
-        sweep_done(core);
-    else
+    /* The next move is planned just before the last exposure is over. */
+    if (s->external || s->intent == SWEEP_TO_REST) {
+        if (!firing_busy_now(&core->firing))
+            sweep_done(core);
+    } else if (core->now + CORE_START_TICKS < exposed(core)) {
+        sweep_wake(core, exposed(core) - CORE_START_TICKS);
+    } else {
+        s->phase = SWEEP_MOVE;
         move(core);
+    }
 }
 
 /* The drive says where it stands; should it leave while cameras expose, their shots are lost. */
@@ -163,7 +177,7 @@ static void poll_external(struct core *core)
     const bool reached = core->safety.inputs[BOARD_IN_REACHED];
 
     if (s->phase == SWEEP_SHOOT) {
-        if (!reached && firing_busy_now(&core->firing)) {
+        if (!reached && s->intent == SWEEP_GO && firing_busy_now(&core->firing)) {
             core_report_note(core, "the drive left its position while cameras exposed");
             sweep_break(core, lumi_wire_SweepEnded_How_FAULTED);
         }

@@ -1,0 +1,2 @@
+lumi_test(test_core FOLDERS firmware_host)
+lumi_test(test_core_sweeps FOLDERS firmware_host)
