@@ -4,9 +4,9 @@
 #include <math.h>
 
 #define SUPPLY_PERIOD (BOARD_TICK_HZ / 100)
-#define SUPPLY_READINGS 5                 /* 50 ms below the minimum */
-#define SUPPLY_HYSTERESIS 1.03            /* cleared from so much above it */
-#define WATCH_PERIOD (BOARD_TICK_HZ / 50) /* longer than debouncing and a poll */
+#define SUPPLY_READINGS 5      /* 50 ms below the minimum */
+#define SUPPLY_HYSTERESIS 1.03 /* cleared from so much above it */
+#define WATCH_PERIOD (BOARD_TICK_HZ / 200)
 #define SPEED_TOLERANCE 1.02
 
 #define BIT(fault) (1u << (fault))
@@ -39,12 +39,8 @@ void safety_init(struct core *core)
 
 void safety_watch_index(struct core *core)
 {
-    struct safety *s = &core->safety;
-
-    s->watching = core->rig.control.motion.index_window > 0;
-    s->watched = motion_position(&core->motion);
-    s->watch_due = core->now + WATCH_PERIOD;
-    index_watch_begin(&s->watch, &core->rig, s->watched);
+    index_watch_begin(&core->safety.watch, &core->rig, motion_position(&core->motion),
+                      core->board->input(core->board->port, BOARD_IN_INDEX));
 }
 
 /* What a fault does. Without a profile, or where it says what cannot be for an emergency stop: halted, lines down. */
@@ -77,7 +73,9 @@ void safety_on_input(struct core *core, enum board_input input, bool active, uin
         s->estop_seen = true;
         stop_now(core);
     } else if (input == BOARD_IN_INDEX) {
-        debounce_input(&s->index, active, motion_position(&core->motion), at);
+        const int64_t position = motion_position(&core->motion);
+        debounce_input(&s->index, active, position, at);
+        index_watch_on_input(&s->watch, active, position, at);
     }
 }
 
@@ -116,7 +114,7 @@ static void react(struct core *core, enum lumi_rig_fault fault)
         halt(core, r.motor == LUMI_RIG_MOTOR_OFF);
     if (knew && !motion_known(&core->motion))
         firing_spoil(&core->firing);
-    core->safety.watching = false;
+    index_watch_end(&core->safety.watch);
     if (r.brake && !motion_moving(&core->motion))
         drop_string_close(core);
     if (state_at_rest(core->state)) {
@@ -267,20 +265,11 @@ static void watch_index(struct core *core)
     bool changed = debounce_poll(&s->index, core->now, &edge);
 
     board->unlock(board->port, lock);
-    if (changed && edge.active) {
+    if (changed && edge.active)
         watch_turn(core, &edge);
-        if (s->watching)
-            tell_verdict(core, index_watch_edge(&s->watch, edge.position));
-    }
-    if (!s->watching || core->now < s->watch_due)
-        return;
-    if (state_at_rest(core->state)) {
-        s->watching = false;
-        return;
-    }
-    tell_verdict(core, index_watch_position(&s->watch, s->watched));
-    s->watched = motion_position(&core->motion);
-    s->watch_due = core->now + WATCH_PERIOD;
+    if (state_at_rest(core->state))
+        index_watch_end(&s->watch);
+    tell_verdict(core, index_watch_poll(&s->watch, board, motion_position(&core->motion), core->now));
 }
 
 /* No planner of ours goes faster than the profile allows; should it, that is seen. */
@@ -332,8 +321,8 @@ uint64_t safety_next_poll(const struct core *core)
 
     if (s->estop_seen)
         return core->now;
-    if (s->watching && s->watch_due < next)
-        next = s->watch_due;
+    if (s->watch.active && core->now + WATCH_PERIOD < next)
+        next = core->now + WATCH_PERIOD;
     if (s->index.bouncing && s->index.latest + DEBOUNCE_TICKS < next)
         next = s->index.latest + DEBOUNCE_TICKS;
     for (int i = 0; i < BOARD_INPUTS; i++)

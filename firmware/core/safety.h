@@ -19,9 +19,6 @@ struct safety {
     struct debounce index;       /* shared with the interrupt, under lock */
     struct debounce_edge marked; /* the last index mark, for the time between them; `active`: there is one */
     struct index_watch watch;
-    bool watching;   /* marks must come where they should: a sweep is under way */
-    int64_t watched; /* position at watch_due, told once edges up to there have been */
-    uint64_t watch_due;
     bool inputs[BOARD_INPUTS]; /* debounced */
     bool raw[BOARD_INPUTS];
     uint64_t changed[BOARD_INPUTS]; /* of raw */
