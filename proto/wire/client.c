@@ -58,18 +58,23 @@ static void send_request(struct lumi_wire_client *client, uint64_t now_ns)
     client->request_due_ns = due(sent, now_ns, LUMI_WIRE_RETRY_NS);
 }
 
-static void send_heartbeat(struct lumi_wire_client *client, uint64_t now_ns)
+/* Quiet: only acknowledges. */
+static void send_heartbeat(struct lumi_wire_client *client, bool quiet, uint64_t now_ns)
 {
     lumi_wire_HostFrame out = {.which_body = lumi_wire_HostFrame_heartbeat_tag};
 
     out.body.heartbeat = (lumi_wire_Heartbeat){.token = client->welcome.token,
                                                .host_time = now_ns,
                                                .events_next = client->events_next,
-                                               .observer = client->observer};
+                                               .observer = client->observer,
+                                               .quiet = quiet};
     bool sent = send_message(client, &out);
+    if (!quiet)
+        client->heartbeat_due_ns = due(sent, now_ns, LUMI_WIRE_HEARTBEAT_NS);
     if (sent)
         client->acknowledge = false;
-    client->heartbeat_due_ns = due(sent, now_ns, LUMI_WIRE_HEARTBEAT_NS);
+    else
+        client->acknowledge_due_ns = now_ns + LUMI_WIRE_ROOM_NS;
 }
 
 static bool send_stop(struct lumi_wire_client *client, uint64_t now_ns)
@@ -97,7 +102,9 @@ void lumi_wire_client_poll(struct lumi_wire_client *client, uint64_t now_ns)
         send_request(client, now_ns);
     }
     if (now_ns >= client->heartbeat_due_ns)
-        send_heartbeat(client, now_ns);
+        send_heartbeat(client, false, now_ns);
+    else if (client->acknowledge && now_ns >= client->acknowledge_due_ns)
+        send_heartbeat(client, true, now_ns);
 }
 
 static uint64_t earlier(uint64_t a, uint64_t b)
@@ -115,6 +122,8 @@ uint64_t lumi_wire_client_next_poll(const struct lumi_wire_client *client)
         next = earlier(next, client->hello_due_ns);
     if (client->state == LUMI_WIRE_CLIENT_OPEN) {
         next = earlier(next, client->heartbeat_due_ns);
+        if (client->acknowledge)
+            next = earlier(next, client->acknowledge_due_ns);
         if (client->in_flight)
             next = earlier(next, client->request_due_ns);
     }
@@ -201,14 +210,15 @@ static void on_welcome(struct lumi_wire_client *client, const lumi_wire_Welcome 
     }
     if (lost)
         client->in_flight = false;
-    if (!client->in_flight)
+    /* In the session of before, our own count is newer: the reply may have overtaken this Welcome. */
+    if (lost || welcome->token != client->welcome.token)
         client->number = welcome->last_request;
     client->welcome = *welcome;
     client->welcomed = true;
     client->state = LUMI_WIRE_CLIENT_OPEN;
     if (client->in_flight)
         send_request(client, now_ns);
-    send_heartbeat(client, now_ns);
+    send_heartbeat(client, false, now_ns);
     client->ops->welcome(client->context, &client->welcome, restarted);
     if (lost)
         client->ops->request_lost(client->context, number);
@@ -285,7 +295,7 @@ static void on_event(struct lumi_wire_client *client, lumi_wire_Event *event, ui
         return;
     if (!client->acknowledge) {
         client->acknowledge = true;
-        client->heartbeat_due_ns = earlier(client->heartbeat_due_ns, now_ns + LUMI_WIRE_ACKNOWLEDGE_NS);
+        client->acknowledge_due_ns = now_ns + LUMI_WIRE_ACKNOWLEDGE_NS;
     }
     if ((int32_t)(event->oldest - client->events_next) > 0)
         skip_to(client, event->oldest);

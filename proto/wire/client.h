@@ -19,7 +19,7 @@
 extern "C" {
 #endif
 
-#define LUMI_WIRE_RETRY_NS 100000000u /* a request or an emergency stop without an answer is sent again after this */
+#define LUMI_WIRE_RETRY_NS 200000000u /* a request or an emergency stop without an answer is sent again after this */
 #define LUMI_WIRE_HELLO_NS 250000000u /* and a Hello */
 #define LUMI_WIRE_HEARTBEAT_NS 500000000u  /* between heartbeats where no event is to be acknowledged */
 #define LUMI_WIRE_ACKNOWLEDGE_NS 40000000u /* an event is acknowledged at most this late, with others */
@@ -61,11 +61,11 @@ struct lumi_wire_client {
     uint32_t number; /* of the last request */
     bool in_flight;
     uint32_t events_next;
-    bool acknowledge;    /* an event has come since the last heartbeat */
+    bool acknowledge;    /* an event has come that is not acknowledged yet, nor said to have come again */
     uint64_t pulse_time; /* host_time of the last pulse handed on */
     bool pulsed;
     uint32_t stop_nonce, stops_left; /* an emergency stop that waits for its confirmation; 0: none */
-    uint64_t request_due_ns, heartbeat_due_ns, hello_due_ns, stop_due_ns;
+    uint64_t request_due_ns, heartbeat_due_ns, acknowledge_due_ns, hello_due_ns, stop_due_ns;
     uint64_t heard_ns; /* when the last message came; 0: none has */
     struct lumi_wire_deframer deframer;
     uint8_t request[LUMI_WIRE_PAYLOAD_MAX]; /* encoded, while in flight */

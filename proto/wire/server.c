@@ -30,7 +30,7 @@ void lumi_wire_server_init(struct lumi_wire_server *server, const struct lumi_wi
     for (int i = 0; i < LUMI_WIRE_SESSIONS; i++)
         server->sessions[i].reply_link = -1;
     for (int i = 0; i < LUMI_WIRE_LINKS; i++)
-        lumi_wire_deframer_init(&server->links[i]);
+        lumi_wire_deframer_init(&server->links[i].deframer);
     lumi_wire_events_init(&server->events);
     server->event_link = -1;
 }
@@ -40,13 +40,11 @@ static bool send_payload(struct lumi_wire_server *server, int link, const uint8_
     return server->ops->send(server->context, link, server->frame, lumi_wire_frame(payload, size, server->frame));
 }
 
-/* What is not repeated when there is no room: the host asks again. */
-static void send_message(struct lumi_wire_server *server, int link, const lumi_wire_BoardFrame *message)
+static bool send_message(struct lumi_wire_server *server, int link, const lumi_wire_BoardFrame *message)
 {
     size_t size = lumi_wire_encode_board(message, server->payload, sizeof server->payload);
 
-    if (size > 0)
-        send_payload(server, link, server->payload, size);
+    return size == 0 || send_payload(server, link, server->payload, size);
 }
 
 static lumi_wire_BoardFrame *blank(struct lumi_wire_server *server, pb_size_t body)
@@ -107,15 +105,15 @@ static struct lumi_wire_session *open_session(struct lumi_wire_server *server, u
     return oldest;
 }
 
-static void on_hello(struct lumi_wire_server *server, int link, const lumi_wire_Hello *hello, uint64_t now_ns)
+/* Answers the link's last Hello; opens a session if there is none yet. */
+static bool send_welcome(struct lumi_wire_server *server, int link, uint64_t now_ns)
 {
+    const lumi_wire_Hello *hello = &server->links[link].hello;
     const lumi_wire_Welcome *identity = &server->identity;
     lumi_wire_BoardFrame *out = blank(server, lumi_wire_BoardFrame_welcome_tag);
     lumi_wire_Welcome *welcome = &out->body.welcome;
     uint32_t version = hello->version_max < identity->version_max ? hello->version_max : identity->version_max;
 
-    if (hello->host == 0)
-        return;
     *welcome = *identity;
     welcome->version = version >= hello->version_min && version >= identity->version_min ? version : 0;
     welcome->host = hello->host;
@@ -129,7 +127,7 @@ static void on_hello(struct lumi_wire_server *server, int link, const lumi_wire_
         welcome->last_request = session->last;
         welcome->events_first = server->events.first;
     }
-    send_message(server, link, out);
+    return send_message(server, link, out);
 }
 
 /* ---- requests ---- */
@@ -176,13 +174,8 @@ static void refuse(lumi_wire_Reply *reply, lumi_wire_Result result, const char *
     lumi_wire_copy_text(reply->text, sizeof reply->text, text);
 }
 
-static void send_reply(struct lumi_wire_server *server, int link, struct lumi_wire_session *session)
-{
-    session->reply_link = send_payload(server, link, session->reply, session->reply_size) ? -1 : link;
-}
-
 /* The one place where a request is executed: once `last` is set, its number does not come here again. */
-static void execute(struct lumi_wire_server *server, int link, struct lumi_wire_session *session,
+static void execute(struct lumi_wire_server *server, struct lumi_wire_session *session,
                     const lumi_wire_Request *request, bool malformed)
 {
     lumi_wire_BoardFrame *out = blank(server, lumi_wire_BoardFrame_reply_tag);
@@ -209,17 +202,28 @@ static void execute(struct lumi_wire_server *server, int link, struct lumi_wire_
         session->reply_size = (uint16_t)lumi_wire_encode_board(out, session->reply, sizeof session->reply);
     }
     assert(session->reply_size > 0);
-    send_reply(server, link, session);
 }
 
+/* A reply that belongs to no request that was executed. */
 static void answer(struct lumi_wire_server *server, int link, uint32_t token, uint32_t number, lumi_wire_Result result)
 {
+    struct lumi_wire_server_link *to = &server->links[link];
+
+    to->answer = true;
+    to->answer_token = token;
+    to->answer_number = number;
+    to->answer_result = result;
+}
+
+static bool send_answer(struct lumi_wire_server *server, int link)
+{
+    const struct lumi_wire_server_link *to = &server->links[link];
     lumi_wire_BoardFrame *out = blank(server, lumi_wire_BoardFrame_reply_tag);
 
-    out->body.reply.token = token;
-    out->body.reply.number = number;
-    out->body.reply.result = result;
-    send_message(server, link, out);
+    out->body.reply.token = to->answer_token;
+    out->body.reply.number = to->answer_number;
+    out->body.reply.result = to->answer_result;
+    return send_message(server, link, out);
 }
 
 static void on_request(struct lumi_wire_server *server, int link, const lumi_wire_Request *request, bool malformed,
@@ -233,10 +237,11 @@ static void on_request(struct lumi_wire_server *server, int link, const lumi_wir
     }
     session->heard_ns = now_ns;
     if (request->number == session->last + 1) {
-        execute(server, link, session, request, malformed);
+        execute(server, session, request, malformed);
+        session->reply_link = link;
     } else if (request->number == session->last && session->reply_size > 0) {
         server->repeated++;
-        send_reply(server, link, session);
+        session->reply_link = link;
     } else {
         answer(server, link, request->token, request->number, lumi_wire_Result_OUT_OF_ORDER);
     }
@@ -269,16 +274,27 @@ static void on_heartbeat(struct lumi_wire_server *server, int link, const lumi_w
     session->heard_ns = now_ns;
     if (!beat->observer)
         take_events(server, link, beat, now_ns);
+    if (!beat->quiet) {
+        server->links[link].pulse = true;
+        server->links[link].beat = *beat;
+        server->links[link].beat_ns = now_ns;
+    }
+}
 
+static bool send_pulse(struct lumi_wire_server *server, int link, uint64_t now_ns)
+{
+    const struct lumi_wire_server_link *from = &server->links[link];
     lumi_wire_BoardFrame *out = blank(server, lumi_wire_BoardFrame_pulse_tag);
     lumi_wire_Pulse *pulse = &out->body.pulse;
-    pulse->token = beat->token;
-    pulse->host_time = beat->host_time;
-    pulse->received_ns = pulse->sent_ns = now_ns;
+
+    pulse->token = from->beat.token;
+    pulse->host_time = from->beat.host_time;
+    pulse->received_ns = from->beat_ns;
+    pulse->sent_ns = now_ns;
     pulse->has_status = true;
     server->ops->status(server->context, &pulse->status);
     fill_counts(server, &pulse->status);
-    send_message(server, link, out);
+    return send_message(server, link, out);
 }
 
 static size_t put_varint(uint8_t *data, uint32_t value)
@@ -329,10 +345,10 @@ static void send_events(struct lumi_wire_server *server, uint64_t now_ns)
     struct lumi_wire_events *events = &server->events;
     size_t size;
 
-    if (server->event_link >= 0 && now_ns - server->event_heard_ns >= LUMI_WIRE_SILENCE_NS)
+    if (now_ns - server->event_heard_ns >= LUMI_WIRE_SILENCE_NS) {
         server->event_link = -1;
-    if (server->event_link < 0)
         return;
+    }
     if (events->cursor != events->first && now_ns >= server->event_resend_ns)
         lumi_wire_events_rewind(events);
     while ((size = event_payload(server)) > 0) {
@@ -346,9 +362,35 @@ static void send_events(struct lumi_wire_server *server, uint64_t now_ns)
 
 /* ---- entries ---- */
 
+static void send_waiting(struct lumi_wire_server *server, uint64_t now_ns)
+{
+    for (int i = 0; i < LUMI_WIRE_SESSIONS; i++) {
+        struct lumi_wire_session *session = &server->sessions[i];
+
+        if (session->reply_link >= 0 && send_payload(server, session->reply_link, session->reply, session->reply_size))
+            session->reply_link = -1;
+    }
+    for (int i = 0; i < LUMI_WIRE_LINKS; i++) {
+        struct lumi_wire_server_link *link = &server->links[i];
+
+        link->welcome = link->welcome && !send_welcome(server, i, now_ns);
+        link->answer = link->answer && !send_answer(server, i);
+        link->pulse = link->pulse && !send_pulse(server, i, now_ns);
+    }
+}
+
+/* Nothing that goes before events waits for this link. */
+static bool clear_for_events(const struct lumi_wire_server *server, int link)
+{
+    for (int i = 0; i < LUMI_WIRE_SESSIONS; i++)
+        if (server->sessions[i].reply_link == link)
+            return false;
+    return !server->links[link].welcome && !server->links[link].answer && !server->links[link].pulse;
+}
+
 static void on_frame(struct lumi_wire_server *server, int link, uint64_t now_ns)
 {
-    const struct lumi_wire_deframer *deframer = &server->links[link];
+    const struct lumi_wire_deframer *deframer = &server->links[link].deframer;
     lumi_wire_HostFrame *in = &server->scratch[0].in;
 
     if (!lumi_wire_decode_host(deframer->data, deframer->size, in)) {
@@ -363,7 +405,8 @@ static void on_frame(struct lumi_wire_server *server, int link, uint64_t now_ns)
     }
     switch (in->which_body) {
     case lumi_wire_HostFrame_hello_tag:
-        on_hello(server, link, &in->body.hello, now_ns);
+        server->links[link].welcome = in->body.hello.host != 0;
+        server->links[link].hello = in->body.hello;
         break;
     case lumi_wire_HostFrame_request_tag:
         on_request(server, link, &in->body.request, false, now_ns);
@@ -386,27 +429,25 @@ void lumi_wire_server_receive(struct lumi_wire_server *server, int link, const u
 {
     assert(link >= 0 && link < LUMI_WIRE_LINKS);
     for (size_t i = 0; i < size; i++)
-        if (lumi_wire_deframe(&server->links[link], data[i]))
+        if (lumi_wire_deframe(&server->links[link].deframer, data[i])) {
             on_frame(server, link, now_ns);
+            send_waiting(server, now_ns);
+        }
 }
 
 void lumi_wire_server_poll(struct lumi_wire_server *server, uint64_t now_ns)
 {
-    for (int i = 0; i < LUMI_WIRE_SESSIONS; i++) {
-        struct lumi_wire_session *session = &server->sessions[i];
-
-        if (session->reply_link >= 0)
-            send_reply(server, session->reply_link, session);
-    }
-    send_events(server, now_ns);
+    send_waiting(server, now_ns);
+    if (server->event_link >= 0 && clear_for_events(server, server->event_link))
+        send_events(server, now_ns);
 }
 
 uint64_t lumi_wire_server_next_poll(const struct lumi_wire_server *server, uint64_t now_ns)
 {
     const struct lumi_wire_events *events = &server->events;
 
-    for (int i = 0; i < LUMI_WIRE_SESSIONS; i++)
-        if (server->sessions[i].reply_link >= 0)
+    for (int i = 0; i < LUMI_WIRE_LINKS; i++)
+        if (!clear_for_events(server, i))
             return now_ns;
     if (server->event_link < 0 || events->first == events->next)
         return UINT64_MAX;

@@ -21,16 +21,28 @@ extern "C" {
 
 #define LUMI_WIRE_SESSIONS 4
 #define LUMI_WIRE_LINKS 2
-#define LUMI_WIRE_EVENT_RESEND_NS 250000000u /* events that are not acknowledged are sent again after this */
+#define LUMI_WIRE_EVENT_RESEND_NS 500000000u /* events that are not acknowledged are sent again after this */
 #define LUMI_WIRE_SILENCE_NS 3000000000u     /* a host without a heartbeat for this gets no more events */
 
 struct lumi_wire_session {
     uint64_t host;        /* 0: none */
     uint32_t token, last; /* number of the last request that was executed */
     uint64_t heard_ns;
-    int reply_link;                       /* the reply waits for room on this link; −1: it does not */
+    int reply_link;                       /* the reply waits to be sent over this link; −1: it does not */
     uint16_t reply_size;                  /* 0: nothing executed yet */
     uint8_t reply[LUMI_WIRE_PAYLOAD_MAX]; /* encoded */
+};
+
+/* One link: bytes that come in, and answers that wait for room, the latest of each kind. They go before events, so that
+ * a link that is full of events keeps nobody out. */
+struct lumi_wire_server_link {
+    struct lumi_wire_deframer deframer;
+    bool welcome, pulse, answer;
+    lumi_wire_Hello hello;
+    lumi_wire_Heartbeat beat;
+    uint64_t beat_ns; /* when it came */
+    uint32_t answer_token, answer_number;
+    lumi_wire_Result answer_result;
 };
 
 /* The board behind it. */
@@ -53,7 +65,7 @@ struct lumi_wire_server {
     void *context;
     lumi_wire_Welcome identity;
     struct lumi_wire_session sessions[LUMI_WIRE_SESSIONS];
-    struct lumi_wire_deframer links[LUMI_WIRE_LINKS];
+    struct lumi_wire_server_link links[LUMI_WIRE_LINKS];
     struct lumi_wire_events events;
     uint32_t tokens;           /* given out so far */
     int event_link;            /* where events go; −1: nowhere */
@@ -74,7 +86,7 @@ void lumi_wire_server_init(struct lumi_wire_server *server, const struct lumi_wi
                            const lumi_wire_Welcome *identity);
 void lumi_wire_server_receive(struct lumi_wire_server *server, int link, const uint8_t *data, size_t size,
                               uint64_t now_ns);
-/* Sends what events and waiting replies there are and the links take. */
+/* Sends what answers, replies and events wait and the links take. */
 void lumi_wire_server_poll(struct lumi_wire_server *server, uint64_t now_ns);
 /* When poll has something to do though nothing else happens: now_ns while something waits for room on a link;
  * UINT64_MAX: never. */

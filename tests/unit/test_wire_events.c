@@ -147,9 +147,9 @@ static void an_event_that_is_lost_on_the_line_comes_again_and_those_after_it_wai
     lumi_wire_server_poll(&board.server, 105 * PAIR_MS);
     pair_lose(&board.out[0]);
     a_burst_of_events(9);
-    pair_run(&host, &board, 0, 110 * PAIR_MS, 300 * PAIR_MS);
+    pair_run(&host, &board, 0, 110 * PAIR_MS, 600 * PAIR_MS);
     assert_int_equal(host.events, 0);
-    pair_run(&host, &board, 0, 305 * PAIR_MS, 400 * PAIR_MS);
+    pair_run(&host, &board, 0, 605 * PAIR_MS, 700 * PAIR_MS);
     assert_int_equal(host.events, 10);
     assert_false(host.disorder);
     assert_int_equal(host.client.gaps, 9);
@@ -191,6 +191,44 @@ static void who_only_looks_takes_no_events_and_keeps_no_sweep_alive(void **state
     assert_int_equal(host.events, 5);
 }
 
+static void acknowledgements_are_quiet(void **state)
+{
+    int pulses;
+
+    (void)state;
+    pair_run(&host, &board, 0, 10 * PAIR_MS, 100 * PAIR_MS);
+    pulses = host.pulses;
+    for (uint64_t i = 0; i < 20; i++) {
+        a_burst_of_events(1);
+        pair_run(&host, &board, 0, (110 + 50 * i) * PAIR_MS, (155 + 50 * i) * PAIR_MS);
+    }
+    assert_int_equal(host.events, 20);
+    assert_in_range(board.server.events.next - board.server.events.first, 0, 1);
+    assert_int_equal(host.pulses, pulses + 2); /* a second has passed */
+}
+
+static void answers_go_before_events(void **state)
+{
+    (void)state;
+    pair_run(&host, &board, 0, 10 * PAIR_MS, 100 * PAIR_MS);
+    board.out[0].full = true;
+    a_burst_of_events(100);
+    say_hello(99, 110 * PAIR_MS);
+    assert_int_equal(request(&host, 110 * PAIR_MS), LUMI_OK);
+    lumi_wire_client_poll(&host.client, 700 * PAIR_MS);
+    lumi_wire_server_receive(&board.server, 0, host.out.data, host.out.size, 700 * PAIR_MS);
+    pair_lose(&host.out);
+    lumi_wire_server_poll(&board.server, 701 * PAIR_MS);
+    board.out[0].full = false;
+    board.out[0].size = PAIR_QUEUE - 600; /* room for these, not for many events */
+    lumi_wire_server_poll(&board.server, 702 * PAIR_MS);
+    memset(board.out[0].data, 0, PAIR_QUEUE - 600);
+    lumi_wire_client_receive(&host.client, board.out[0].data, board.out[0].size, 703 * PAIR_MS);
+    assert_int_equal(host.replies, 1);
+    assert_true(host.pulse.received_ns == 700 * PAIR_MS && host.pulse.sent_ns == 702 * PAIR_MS);
+    assert_in_range(host.events, 1, 5);
+}
+
 static void a_silent_host_is_sent_nothing_more(void **state)
 {
     (void)state;
@@ -198,7 +236,7 @@ static void a_silent_host_is_sent_nothing_more(void **state)
     lumi_wire_server_poll(&board.server, 1000 * PAIR_MS);
     assert_true(board.out[0].size > 0);
     pair_lose(&board.out[0]);
-    lumi_wire_server_poll(&board.server, 1300 * PAIR_MS);
+    lumi_wire_server_poll(&board.server, 1600 * PAIR_MS);
     assert_true(board.out[0].size > 0); /* again */
     pair_lose(&board.out[0]);
     lumi_wire_server_poll(&board.server, 4000 * PAIR_MS);
@@ -273,6 +311,8 @@ int main(void)
         OPEN(an_event_that_is_lost_on_the_line_comes_again_and_those_after_it_wait),
         OPEN(a_new_host_begins_with_what_is_kept),
         OPEN(who_only_looks_takes_no_events_and_keeps_no_sweep_alive),
+        OPEN(acknowledgements_are_quiet),
+        OPEN(answers_go_before_events),
         OPEN(a_silent_host_is_sent_nothing_more),
         OPEN(events_of_an_earlier_boot_are_dropped),
         OPEN(the_numbers_of_events_wrap),

@@ -28,16 +28,16 @@ static void a_lost_request_is_sent_again_and_a_lost_reply_repeated(void **state)
     (void)state;
     assert_int_equal(request(&host, 2 * PAIR_MS), LUMI_OK);
     pair_lose(&host.out);
-    lumi_wire_client_poll(&host.client, 50 * PAIR_MS);
-    pair_carry(&host, &board, 0, 50 * PAIR_MS);
+    lumi_wire_client_poll(&host.client, 150 * PAIR_MS);
+    pair_carry(&host, &board, 0, 150 * PAIR_MS);
     assert_int_equal(board.executed, 0); /* too early */
-    lumi_wire_client_poll(&host.client, 102 * PAIR_MS);
-    lumi_wire_server_receive(&board.server, 0, host.out.data, host.out.size, 103 * PAIR_MS);
+    lumi_wire_client_poll(&host.client, 202 * PAIR_MS);
+    lumi_wire_server_receive(&board.server, 0, host.out.data, host.out.size, 203 * PAIR_MS);
     assert_int_equal(board.executed, 1);
     pair_lose(&host.out);
     pair_lose(&board.out[0]); /* the reply */
-    lumi_wire_client_poll(&host.client, 202 * PAIR_MS);
-    pair_carry(&host, &board, 0, 203 * PAIR_MS);
+    lumi_wire_client_poll(&host.client, 402 * PAIR_MS);
+    pair_carry(&host, &board, 0, 403 * PAIR_MS);
     assert_int_equal(board.executed, 1);
     assert_int_equal(host.replies, 1);
     assert_int_equal(host.client.retries, 2);
@@ -130,6 +130,29 @@ static void a_request_in_flight_survives_a_reconnection(void **state)
     assert_int_equal(host.requests_lost, 0);
     assert_int_equal(host.restarts, 0);
     assert_int_equal(host.client.welcome.token, token);
+}
+
+static void a_reply_that_overtakes_the_welcome_counts(void **state)
+{
+    struct pair_queue welcome;
+
+    (void)state;
+    assert_int_equal(request(&host, 2 * PAIR_MS), LUMI_OK);
+    pair_lose(&host.out);
+    lumi_wire_client_reconnected(&host.client, 10 * PAIR_MS);
+    lumi_wire_server_receive(&board.server, 0, host.out.data, host.out.size, 11 * PAIR_MS);
+    pair_lose(&host.out);
+    welcome = board.out[0]; /* made before the request was executed */
+    pair_lose(&board.out[0]);
+    put(0, host.client.request, host.client.request_size, 12 * PAIR_MS); /* the first copy was only late */
+    lumi_wire_client_receive(&host.client, board.out[0].data, board.out[0].size, 13 * PAIR_MS);
+    pair_lose(&board.out[0]);
+    lumi_wire_client_receive(&host.client, welcome.data, welcome.size, 14 * PAIR_MS);
+    assert_int_equal(host.replies, 1);
+    assert_int_equal(request(&host, 15 * PAIR_MS), LUMI_OK);
+    pair_carry(&host, &board, 0, 16 * PAIR_MS);
+    assert_int_equal(board.executed, 2);
+    assert_int_equal(host.replies, 2);
 }
 
 static void a_session_goes_on_over_the_other_link(void **state)
@@ -312,6 +335,7 @@ int main(void)
         FRESH(late_and_doubled_hellos_change_nothing),
         FRESH(a_late_welcome_is_not_taken),
         OPEN(a_request_in_flight_survives_a_reconnection),
+        OPEN(a_reply_that_overtakes_the_welcome_counts),
         OPEN(a_session_goes_on_over_the_other_link),
         OPEN(a_restart_of_the_board_is_told_and_what_was_in_flight_reported_lost),
         OPEN(a_restart_is_noticed_by_a_heartbeat_too),

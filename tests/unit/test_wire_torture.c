@@ -15,6 +15,9 @@
 #include <cmocka.h>
 
 #define MS UINT64_C(1000000)
+#ifndef SEED
+#define SEED 0 /* of all: another one is another hundred thousand */
+#endif
 #define COMMANDS 100000u
 #define HOSTS 2
 #define TO_BOARD 8 /* far ends: host h is h, the board's link l is TO_BOARD + l */
@@ -337,7 +340,7 @@ static void every_command_is_executed_once_and_every_event_comes_once(void **sta
     struct world *w = &world;
 
     (void)state;
-    begin(w, COMMANDS, 1);
+    begin(w, COMMANDS, SEED + 1);
     while (busy(w))
         step(w);
     settle(w);
@@ -353,7 +356,7 @@ static void outages_change_of_links_and_overflow_lose_nothing_in_silence(void **
     struct world *w = &world;
 
     (void)state;
-    begin(w, COMMANDS / 4, 2);
+    begin(w, COMMANDS / 4, SEED + 2);
     w->event_bursts = 5;
     while (busy(w)) {
         uint64_t until = w->now_ns + line_below(&w->line.random, 4000) * MS;
@@ -384,7 +387,7 @@ static void a_restarting_board_executes_nothing_twice(void **state)
     uint32_t restarts = 0;
 
     (void)state;
-    begin(w, COMMANDS / 4, 3);
+    begin(w, COMMANDS / 4, SEED + 3);
     w->event_bursts = 2;
     while (busy(w)) {
         uint64_t until = w->now_ns + line_below(&w->line.random, 1000) * MS;

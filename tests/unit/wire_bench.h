@@ -73,12 +73,17 @@ static inline lumi_wire_BoardFrame last_sent(int link)
     return message;
 }
 
-static inline uint32_t hello(uint64_t number, uint64_t now_ns)
+static inline void say_hello(uint64_t number, uint64_t now_ns)
 {
     lumi_wire_HostFrame message = {.which_body = lumi_wire_HostFrame_hello_tag};
 
     message.body.hello = (lumi_wire_Hello){.version_min = 1, .version_max = 1, .host = number, .nonce = 9};
     put_message(0, &message, now_ns);
+}
+
+static inline uint32_t hello(uint64_t number, uint64_t now_ns)
+{
+    say_hello(number, now_ns);
     lumi_wire_BoardFrame answer = last_sent(0);
     assert_int_equal(answer.which_body, lumi_wire_BoardFrame_welcome_tag);
     assert_int_equal(answer.body.welcome.host, number);
