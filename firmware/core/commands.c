@@ -80,6 +80,7 @@ static void home(struct core *core, const lumi_wire_Home *home_command, lumi_wir
     core->home_goal = home_command->wind_up ? HOMING_WOUND : HOMING_INDEX;
     core->home_turn = home_command->turn;
     core->begun = false;
+    core->homing_asked = true;
     core_state_event(core, EVENT_HOME);
 }
 

@@ -70,6 +70,10 @@ void core_rest(struct core *core)
 
     firing_poll(&core->firing); /* what was broken off is told first */
     core->begun = false;
+    if (core->homing_asked) {
+        core->homing_asked = false;
+        core_report_homed(core, false, "stopped before the mark was found");
+    }
     if (core->sweep.active) {
         core->sweep.active = false;
         lamp_off(&core->lamp);
@@ -120,6 +124,7 @@ static void poll_activity(struct core *core)
             return;
         case HOMING_DONE:
         case HOMING_FAILED:
+            core->homing_asked = false;
             core_report_homed(core, motion_known(&core->motion), motion_known(&core->motion) ? "" : reason);
             core_rest(core);
         }
@@ -135,8 +140,8 @@ static void poll_activity(struct core *core)
             core_rest(core);
         return;
     case lumi_wire_State_STOPPING:
-        if (homing_active(&core->homing) && homing_poll(&core->homing, &reason) != HOMING_RUNNING)
-            core_report_homed(core, false, "stopped");
+        if (homing_active(&core->homing))
+            homing_poll(&core->homing, &reason);
         if (!core->sweep.active && !motion_moving(&core->motion) && !homing_active(&core->homing) &&
             !firing_busy_now(&core->firing))
             core_rest(core);

@@ -44,7 +44,7 @@ struct core {
     struct sweep sweep;
 
     /* Home and Jog, until the brake is open and they begin. */
-    bool begun;
+    bool begun, homing_asked; /* homing_asked: how it ended is still to be told */
     enum homing_goal home_goal;
     int32_t home_turn;
     int64_t jog_target;
