@@ -60,10 +60,8 @@ uint32_t motion_on_step(struct motion *motion, uint64_t at)
 {
     (void)at; /* it is the sum of what this has returned */
     motion->position += motion->direction;
-    if (atomic_load_explicit(&motion->halted, memory_order_relaxed)) {
-        motion->running = false;
-        return 0;
-    }
+    if (!atomic_load_explicit(&motion->running, memory_order_relaxed))
+        return 0; /* it had risen when the steps were stopped */
     uint32_t interval = motion->ending ? 0 : next_interval(motion);
     if (motion->ending)
         motion->running = false;
@@ -299,9 +297,28 @@ bool motion_seek(struct motion *motion, int64_t steps, const struct motion_limit
     return start(motion, steps, limits, 0);
 }
 
+/* Stopped before its first pulse: it does not begin at all. */
+static bool call_off(struct motion *motion)
+{
+    const struct board *board = motion->board;
+    unsigned state = board->lock(board->port);
+    bool begun = !motion->running || motion->position != motion->from;
+
+    if (!begun) {
+        board->steps_stop(board->port);
+        motion->running = false;
+        motion->origin = motion->rest_at = board->now(board->port);
+        motion->ramp.count = 0;
+        motion->ramp.phases[0] = (struct ramp_phase){0};
+        motion->pulses = 0;
+    }
+    board->unlock(board->port, state);
+    return !begun;
+}
+
 void motion_stop(struct motion *motion)
 {
-    if (!motion->running || motion->planned)
+    if (call_off(motion) || !motion->running || motion->planned)
         return;
     ramp_stop(&motion->ramp, motion->at_last.curve.t, &motion->limits);
     int64_t pulses = pulses_to(ramp_end_place(&motion->ramp));

@@ -45,6 +45,7 @@ void ramp_plan(struct ramp *ramp, double distance, const struct motion_limits *l
     double rise = fmin(limits->acceleration / j, whole / 2), hold = whole - 2 * rise;
 
     ramp->count = 0;
+    ramp->stopped = false;
     ramp->phases[0] = (struct ramp_phase){0};
     add_phase(ramp, j, rise);
     add_phase(ramp, 0, hold);
@@ -89,8 +90,9 @@ void ramp_stop(struct ramp *ramp, double t, const struct motion_limits *limits)
 {
     const struct ramp_phase *end = &ramp->phases[ramp->count];
 
-    if (t >= end->t)
+    if (ramp->stopped || t >= end->t)
         return;
+    ramp->stopped = true;
     int n = (int)(phase_of_time(ramp, t) - ramp->phases);
     struct ramp_phase at;
     ramp_at(ramp, t, &at);

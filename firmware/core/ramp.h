@@ -8,6 +8,8 @@
 #ifndef LUMI_FIRMWARE_CORE_RAMP_H
 #define LUMI_FIRMWARE_CORE_RAMP_H
 
+#include <stdbool.h>
+
 /* Limits in steps; from the profile, or lower ones for a search. All positive. */
 struct motion_limits {
     double speed;        /* steps/s */
@@ -19,16 +21,18 @@ struct motion_limits {
 struct ramp_phase {
     double t, x, v, a, j;
 };
-#define RAMP_PHASES 10
+#define RAMP_PHASES 10 /* all seven, cut in the last, and three more */
 
 struct ramp {
     struct ramp_phase phases[RAMP_PHASES + 1]; /* phases[count] is the end: at rest */
     int count;
+    bool stopped;
 };
 
 /* From rest to rest over `distance` (> 0), as fast as the limits allow. Takes lumi_move_time of it. */
 void ramp_plan(struct ramp *ramp, double distance, const struct motion_limits *limits);
-/* Forgets what comes after time t and slows down to rest from there, whatever the acceleration is there. */
+/* Forgets what comes after time t and slows down to rest from there, whatever the acceleration is there. A curve that
+ * was stopped already does so anyway. */
 void ramp_stop(struct ramp *ramp, double t, const struct motion_limits *limits);
 
 /* Place, speed, acceleration and jerk at time t; outside the curve those of its ends. */

@@ -33,6 +33,7 @@ static void a_stop_in_any_phase_keeps_the_limits_and_the_position(void **state)
             assert_int_equal(motion_time_of(&rig->motion, given_up), BOARD_NEVER);
         step_board_run(&rig->board, when + (uint64_t)(uniform() * 0.1 * end * BOARD_TICK_HZ), period);
         motion_stop(&rig->motion);
+        assert_in_range(rig->motion.ramp.count, 0, RAMP_PHASES);
         uint64_t last = motion_end(&rig->motion);
         step_board_run(&rig->board, BOARD_NEVER, period);
         assert_false(motion_starved(&rig->motion));
@@ -41,8 +42,10 @@ static void a_stop_in_any_phase_keeps_the_limits_and_the_position(void **state)
         assert_int_equal(rig->board.steps, rig->board.count);
         assert_true((double)rig->board.count <= bound);
         assert_true(fabs((double)rig->board.steps - ramp_end_place(&rig->motion.ramp)) < 0.5001);
-        assert_true(llabs((long long)(last - rig->board.pulses[rig->board.count - 1])) <= MOTION_RAMP_TICKS);
-        assert_within_limits(rig, &l);
+        if (rig->board.count > 0) {
+            assert_true(llabs((long long)(last - rig->board.pulses[rig->board.count - 1])) <= MOTION_RAMP_TICKS);
+            assert_within_limits(rig, &l);
+        }
         /* And on it goes, not before the last curve is at rest. */
         uint64_t rest = rig->motion.rest_at;
         move(rig, distance + 1, &l, period);
@@ -66,18 +69,26 @@ static void a_stop_comes_within_thirty_milliseconds(void **state)
     rig_free(rig);
 }
 
-static void a_stop_before_the_first_step_and_at_rest_is_harmless(void **state)
+static void a_stop_before_the_first_step_calls_the_move_off(void **state)
 {
     (void)state;
     struct rig *rig = rig_new();
 
+    motion_stop(&rig->motion); /* at rest: nothing */
+    move(rig, 50, &bar2, MS);
+    rig->board.count = 0;
+    assert_true(motion_start(&rig->motion, 28800, &bar2, rig->board.now + 10 * (uint64_t)BOARD_TICK_HZ));
+    step_board_run(&rig->board, rig->board.now + 9 * (uint64_t)BOARD_TICK_HZ, MS);
+    assert_true(motion_moving(&rig->motion));
     motion_stop(&rig->motion);
-    assert_true(motion_start(&rig->motion, 28800, &bar2, 0));
-    motion_stop(&rig->motion);
-    step_board_run(&rig->board, BOARD_NEVER, MS);
-    assert_int_equal(motion_position(&rig->motion), rig->board.count);
-    assert_in_range(rig->board.count, 1, 100);
-    motion_stop(&rig->motion);
+    assert_false(motion_moving(&rig->motion));
+    assert_false(rig->board.stepping);
+    assert_int_equal(motion_end(&rig->motion), rig->board.now);
+    assert_int_equal(motion_time_of(&rig->motion, 1000), BOARD_NEVER);
+    assert_true(motion_speed(&rig->motion, rig->board.now) == 0);
+    step_board_run(&rig->board, rig->board.now + 9 * (uint64_t)BOARD_TICK_HZ, MS);
+    assert_int_equal(rig->board.count, 0);
+    assert_true(motion_known(&rig->motion));
     move(rig, 0, &bar2, MS);
     rig_free(rig);
 }
@@ -236,15 +247,68 @@ static void it_is_polled_as_often_as_it_asks(void **state)
     rig_free(rig);
 }
 
+/* Whatever is asked for in whatever order: every step is counted, none comes while halted, and what is known is true.
+ */
+static void any_order_of_moves_stops_and_halts_keeps_the_count(void **state)
+{
+    (void)state;
+    seed = 19;
+    for (int i = 0; i < 40; i++) {
+        struct rig *rig = rig_new();
+        int64_t offset = 0; /* of the position from the truth; changes when it is set */
+        for (int n = 0; n < 100; n++) {
+            struct motion_limits l = random_limits();
+            int64_t by = random_distance(&l) % 5000 + 1;
+            bool moving = motion_moving(&rig->motion), halted = motion_halted(&rig->motion), done;
+            size_t count = rig->board.count;
+            switch ((int)(uniform() * 8)) {
+            case 0:
+            case 1:
+            case 2:
+                if (uniform() < 0.5)
+                    by = -by;
+                done = motion_start(&rig->motion, motion_position(&rig->motion) + by, &l, 0);
+                assert_int_equal(done, !moving && !halted && motion_known(&rig->motion));
+                break;
+            case 3:
+                assert_int_equal(motion_seek(&rig->motion, -by, &l), !moving && !halted);
+                break;
+            case 4:
+                motion_stop(&rig->motion);
+                break;
+            case 5:
+                motion_halt(&rig->motion);
+                assert_false(rig->board.stepping);
+                break;
+            case 6:
+                motion_release(&rig->motion);
+                break;
+            default:
+                motion_set_position(&rig->motion, by);
+                if (!moving)
+                    offset = by - rig->board.steps;
+            }
+            step_board_run(&rig->board, rig->board.now + (uint64_t)(between(1e-4, 2) * BOARD_TICK_HZ), 2 * MS);
+            assert_false(motion_starved(&rig->motion));
+            assert_int_equal(motion_position(&rig->motion), rig->board.steps + offset);
+            assert_int_equal(motion_moving(&rig->motion), rig->board.stepping);
+            if (motion_halted(&rig->motion))
+                assert_int_equal(rig->board.count, count);
+        }
+        rig_free(rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_stop_in_any_phase_keeps_the_limits_and_the_position),
         cmocka_unit_test(a_stop_comes_within_thirty_milliseconds),
-        cmocka_unit_test(a_stop_before_the_first_step_and_at_rest_is_harmless),
+        cmocka_unit_test(a_stop_before_the_first_step_calls_the_move_off),
         cmocka_unit_test(after_a_halt_no_step_comes_and_the_count_is_right),
         cmocka_unit_test(a_halt_at_rest_keeps_the_position),
         cmocka_unit_test(a_halt_while_a_move_is_being_started_wins),
+        cmocka_unit_test(any_order_of_moves_stops_and_halts_keeps_the_count),
         cmocka_unit_test(a_main_loop_that_is_late_ends_the_steps_and_never_makes_a_wrong_one),
         cmocka_unit_test(a_main_loop_every_ten_milliseconds_is_enough),
         cmocka_unit_test(it_is_polled_as_often_as_it_asks),
