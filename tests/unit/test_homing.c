@@ -139,6 +139,11 @@ static enum homing_result home(struct plant *p, enum homing_goal goal, int turn,
         if (result != HOMING_RUNNING)
             break;
         assert_true(p->board.now < (uint64_t)3600 * BOARD_TICK_HZ);
+        if (p->homing.phase == HOMING_APPROACH) {
+            double slow = p->rig.control.motion.home_speed / 4 / (2 * LUMI_PI) * p->turn;
+            double speed = motion_speed(&p->motion, p->board.now);
+            assert_true(speed >= 0 && speed <= slow * 1.000001);
+        }
         if (p->halt_at && p->board.now >= p->halt_at)
             motion_halt(&p->motion);
         advance(p, p->board.now + MS + random_below(p, MS));

@@ -145,14 +145,12 @@ static void a_halt_at_rest_keeps_the_position(void **state)
 }
 
 static struct motion *halted_by_lock;
+static int locks_before_halt;
 
 static unsigned lock_and_halt(void *port)
 {
-    struct motion *motion = halted_by_lock;
-
-    halted_by_lock = NULL;
-    if (motion)
-        motion_halt(motion); /* the e-stop's interrupt, just before interrupts are held off */
+    if (locks_before_halt-- == 0)
+        motion_halt(halted_by_lock); /* the e-stop's interrupt, just before interrupts are held off */
     return step_board_lock(port);
 }
 
@@ -160,16 +158,36 @@ static void a_halt_while_a_move_is_being_started_wins(void **state)
 {
     (void)state;
     struct rig *rig = rig_new();
+    int halted = 0;
 
     rig->board.board.lock = lock_and_halt;
-    for (int n = 0; n < 2; n++) {
-        halted_by_lock = &rig->motion;
-        if (n == 0)
-            motion_position(&rig->motion);
-        assert_false(motion_start(&rig->motion, 100, &bar2, 0));
+    halted_by_lock = &rig->motion;
+    for (int n = 0; n < 5; n++) {
+        locks_before_halt = n;
+        bool started = motion_start(&rig->motion, 100, &bar2, 0);
+        if (locks_before_halt >= 0)
+            break; /* it locks no more often */
+        halted++;
+        assert_false(started);
         assert_int_equal(rig->board.starts, 0);
+        assert_true(motion_known(&rig->motion));
         motion_release(&rig->motion);
     }
+    assert_in_range(halted, 1, 4);
+    rig_free(rig);
+}
+
+static void a_halt_before_the_first_step_keeps_the_position(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_new();
+
+    assert_true(motion_start(&rig->motion, 5000, &bar2, 0));
+    motion_halt(&rig->motion);
+    assert_false(rig->board.stepping);
+    assert_true(motion_known(&rig->motion));
+    motion_release(&rig->motion);
+    move(rig, 10, &bar2, MS);
     rig_free(rig);
 }
 
@@ -308,6 +326,7 @@ int main(void)
         cmocka_unit_test(after_a_halt_no_step_comes_and_the_count_is_right),
         cmocka_unit_test(a_halt_at_rest_keeps_the_position),
         cmocka_unit_test(a_halt_while_a_move_is_being_started_wins),
+        cmocka_unit_test(a_halt_before_the_first_step_keeps_the_position),
         cmocka_unit_test(any_order_of_moves_stops_and_halts_keeps_the_count),
         cmocka_unit_test(a_main_loop_that_is_late_ends_the_steps_and_never_makes_a_wrong_one),
         cmocka_unit_test(a_main_loop_every_ten_milliseconds_is_enough),
