@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#define TEXT_LINE 256  /* longest line, with its 0 */
+#define TEXT_LINE 1024 /* longest line, with its 0: a plan may name 16 cameras in one */
 #define TEXT_NUMBER 40 /* longest number, with its 0 */
 
 /* Copies the line that begins at *at and moves *at behind it; false: longer than TEXT_LINE, or with a 0 in it. */

@@ -411,6 +411,23 @@ static void a_plan_that_is_printed_parses_to_the_same_numbers(void **state)
     }
 }
 
+static void all_cameras_can_be_named_in_one_line(void **state)
+{
+    char text[LUMI_PLAN_TEXT_MAX];
+    struct lumi_rig rig = builtin("arc16");
+    struct lumi_plan plan = plan_for(&rig), back;
+    struct lumi_error error = {0};
+
+    (void)state;
+    for (int i = 0; i < 16; i++)
+        snprintf(rig.cameras[i].name, sizeof rig.cameras[i].name, "camera-with-the-longest-name-%02d", i);
+    plan.cameras = 0xffff;
+    assert_true(lumi_plan_print(&plan, &rig, text, sizeof text) < sizeof text);
+    if (parse(text, &rig, &back, &error) != LUMI_OK)
+        fail_msg("%s", error.text);
+    assert_memory_equal(&back, &plan, sizeof plan);
+}
+
 static void exposures_are_listed_or_given_by_stops(void **state)
 {
     struct lumi_rig rig = builtin("bar2");
@@ -495,6 +512,7 @@ int main(void)
         cmocka_unit_test(the_run_up_is_ramp_and_margin_or_the_backlash),
         cmocka_unit_test(focus_lines_and_long_pulses_take_their_time_at_a_position),
         cmocka_unit_test(a_plan_that_is_printed_parses_to_the_same_numbers),
+        cmocka_unit_test(all_cameras_can_be_named_in_one_line),
         cmocka_unit_test(exposures_are_listed_or_given_by_stops),
         cmocka_unit_test(plans_that_cannot_be_read_are_refused_with_the_line),
     };
