@@ -19,8 +19,8 @@ struct watch {
     struct lumi_rig_drive_sweep *sweep;
     uint32_t awaited_first, awaited_count; /* shots */
     uint32_t seen;                         /* of them, fired or lost */
-    bool faulted, restarted;
-    char fault[160];
+    bool faulted, restarted, ended, complete;
+    char fault[160], note[80];
 };
 
 static uint64_t seconds_from_now(double seconds)
@@ -46,6 +46,11 @@ static void take(struct watch *watch, const struct lumi_rig_notice *notice)
             sweep->lost++;
         else
             sweep->fired++;
+    } else if (event->which_kind == lumi_wire_Event_sweep_ended_tag) {
+        watch->ended = true;
+        watch->complete = event->kind.sweep_ended.how == lumi_wire_SweepEnded_How_COMPLETE;
+    } else if (event->which_kind == lumi_wire_Event_note_tag) {
+        snprintf(watch->note, sizeof watch->note, "%s", event->kind.note.text);
     } else if (event->which_kind == lumi_wire_Event_fault_tag && event->kind.fault.set) {
         uint32_t fault = event->kind.fault.fault;
         watch->faulted = true;
@@ -147,6 +152,21 @@ static int home(struct watch *watch, struct lumi_error *error)
     return wait_for_drive(watch, NAN, lumi_rig_drive_map(sweep->drive)->home_timeout, error);
 }
 
+/* The board counts steps that it does not make: it takes the host's word for where the platform is. */
+static int tell_place(struct watch *watch, struct lumi_error *error)
+{
+    struct lumi_rig_drive_sweep *sweep = watch->sweep;
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_get_status_tag};
+    lumi_wire_Reply reply;
+
+    LUMI_TRY(lumi_rig_link_command(sweep->link, &request, ANSWER_SECONDS, &reply, error));
+    if (reply.which_payload == lumi_wire_Reply_status_tag && reply.payload.status.position_known)
+        return LUMI_OK;
+    request.which_command = lumi_wire_Request_home_tag;
+    request.command.home = (lumi_wire_Home){.turn = sweep->plan->first_turn};
+    return lumi_rig_link_command(sweep->link, &request, ANSWER_SECONDS, NULL, error);
+}
+
 static double bracket_seconds(const struct lumi_plan *plan)
 {
     double seconds = 0;
@@ -166,16 +186,21 @@ static int fire(struct watch *watch, int position, struct lumi_error *error)
     watch->awaited_first = (uint32_t)(position * sweep->plan->bracket);
     watch->awaited_count = (uint32_t)sweep->plan->bracket;
     watch->seen = 0;
+    watch->ended = false;
+    watch->note[0] = '\0';
     request.command.fire_here.first_shot = watch->awaited_first;
     request.command.fire_here.timeout = REACHED_SECONDS;
     LUMI_TRY(lumi_rig_link_command(sweep->link, &request, ANSWER_SECONDS, NULL, error));
-    while (watch->seen < watch->awaited_count) {
+    while (!watch->ended) {
         listen(watch, 0.25);
         LUMI_TRY(judge(watch, error));
         if (lumi_rig_link_now() >= deadline)
-            return lumi_fail(error, LUMI_ERR_IO, "the board has told of %u of the %u shots of position %d", watch->seen,
-                             watch->awaited_count, position);
+            return lumi_fail(error, LUMI_ERR_IO, "the board has told of %u of the %u shots of position %d",
+                             watch->seen, watch->awaited_count, position);
     }
+    if (!watch->complete)
+        return lumi_fail(error, LUMI_ERR_IO, "the board ended position %d: %s", position,
+                         watch->note[0] ? watch->note : "it gave no reason");
     sweep->next_shot = watch->awaited_first + watch->awaited_count;
     return LUMI_OK;
 }
@@ -211,6 +236,7 @@ int lumi_rig_drive_sweep(struct lumi_rig_drive_sweep *sweep, struct lumi_error *
     LUMI_GOTO(code, done, switch_on(&watch, error));
     if (sweep->home)
         LUMI_GOTO(code, done, home(&watch, error));
+    LUMI_GOTO(code, done, tell_place(&watch, error));
     for (int position = first; position < plan->positions * plan->turns; position++) {
         double turns = plan->first_turn + (double)position / plan->positions;
         if (sweep->cancelled && sweep->cancelled(sweep->context)) {

@@ -225,7 +225,7 @@ static int fired_count, estop_at;
 
 static void fire_here(const lumi_wire_FireHere *here, lumi_wire_Reply *reply)
 {
-    if (!fake_drive_reached(&fake)) {
+    if (!fake_drive_reached(&fake) || !board.status.position_known) {
         reply->result = lumi_wire_Result_REFUSED;
         snprintf(reply->text, sizeof reply->text, "the position-reached line is not active");
         return;
@@ -238,6 +238,9 @@ static void fire_here(const lumi_wire_FireHere *here, lumi_wire_Reply *reply)
         if (fired_count < 64)
             fired_at[fired_count++] = fake_drive_position(&fake);
     }
+    lumi_wire_Event ended = {.which_kind = lumi_wire_Event_sweep_ended_tag, .time_ns = fake_board_time(&board)};
+    if (!estop_at || fired_count < estop_at)
+        lumi_wire_server_event(&board.server, &ended);
     if (estop_at && fired_count >= estop_at) {
         lumi_wire_Event event = {.which_kind = lumi_wire_Event_fault_tag, .time_ns = fake_board_time(&board)};
         event.kind.fault.fault = LUMI_RIG_FAULT_ESTOP;
@@ -248,8 +251,12 @@ static void fire_here(const lumi_wire_FireHere *here, lumi_wire_Reply *reply)
 
 static void obey(struct fake_board *self, const lumi_wire_Request *request, lumi_wire_Reply *reply)
 {
-    (void)self;
-    if (request->which_command == lumi_wire_Request_set_output_tag) {
+    if (request->which_command == lumi_wire_Request_get_status_tag) {
+        reply->which_payload = lumi_wire_Reply_status_tag;
+        reply->payload.status = self->status;
+    } else if (request->which_command == lumi_wire_Request_home_tag) {
+        self->status.position_known = true;
+    } else if (request->which_command == lumi_wire_Request_set_output_tag) {
         pthread_mutex_lock(&fake.lock);
         fake.enabled = request->command.set_output.active;
         pthread_mutex_unlock(&fake.lock);
