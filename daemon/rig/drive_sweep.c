@@ -195,8 +195,8 @@ static int fire(struct watch *watch, int position, struct lumi_error *error)
         listen(watch, 0.25);
         LUMI_TRY(judge(watch, error));
         if (lumi_rig_link_now() >= deadline)
-            return lumi_fail(error, LUMI_ERR_IO, "the board has told of %u of the %u shots of position %d",
-                             watch->seen, watch->awaited_count, position);
+            return lumi_fail(error, LUMI_ERR_IO, "the board has told of %u of the %u shots of position %d", watch->seen,
+                             watch->awaited_count, position);
     }
     if (!watch->complete)
         return lumi_fail(error, LUMI_ERR_IO, "the board ended position %d: %s", position,
