@@ -148,7 +148,7 @@ static int run_dfu_util(const struct lumi_rig_flash *flash, struct lumi_error *e
     struct tail tail = {.used = 0};
     bool ended;
     pid_t child;
-    int output, status = 0;
+    int output = -1, status = 0;
 
     LUMI_TRY(spawn(flash->program, arguments, &output, &child, error));
     ended = read_until_end(output, flash->loader_seconds, &tail);
