@@ -138,7 +138,7 @@ static void fill_counts(const struct lumi_wire_server *server, lumi_wire_Status 
     status->events_lost = server->events.lost;
 }
 
-static bool finite(double value)
+static bool is_finite(double value)
 {
     return value >= -DBL_MAX && value <= DBL_MAX;
 }
@@ -146,23 +146,23 @@ static bool finite(double value)
 static bool finite_plan(const lumi_wire_Plan *plan)
 {
     for (pb_size_t i = 0; i < plan->exposures_count; i++)
-        if (!finite(plan->exposures[i]))
+        if (!is_finite(plan->exposures[i]))
             return false;
-    return finite(plan->turn_time) && finite(plan->position_time) && finite(plan->settle) &&
-           finite(plan->bracket_gap) && finite(plan->blur_max);
+    return is_finite(plan->turn_time) && is_finite(plan->position_time) && is_finite(plan->settle) &&
+           is_finite(plan->bracket_gap) && is_finite(plan->blur_max);
 }
 
 static bool finite_request(const lumi_wire_Request *request)
 {
     switch (request->which_command) {
     case lumi_wire_Request_jog_tag:
-        return finite(request->command.jog.turns) && finite(request->command.jog.speed);
+        return is_finite(request->command.jog.turns) && is_finite(request->command.jog.speed);
     case lumi_wire_Request_test_triggers_tag:
-        return finite(request->command.test_triggers.exposure) && finite(request->command.test_triggers.gap);
+        return is_finite(request->command.test_triggers.exposure) && is_finite(request->command.test_triggers.gap);
     case lumi_wire_Request_load_plan_tag:
         return finite_plan(&request->command.load_plan.plan);
     case lumi_wire_Request_fire_here_tag:
-        return finite(request->command.fire_here.timeout);
+        return is_finite(request->command.fire_here.timeout);
     default:
         return true;
     }
