@@ -1,3 +1,3 @@
-foreach(test frame session refusals events message profile torture)
+foreach(test frame session refusals events message profile document torture)
   lumi_test(test_wire_${test} FOLDERS wire)
 endforeach()
