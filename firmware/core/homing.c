@@ -251,11 +251,10 @@ static void on_rest(struct homing *homing)
 
 static void finish(struct homing *homing)
 {
-    int position = homing->turn * homing->rig->positions;
+    int64_t step = llround(turns_to_steps(homing, homing->turn)); /* of its turn, which may be −1 */
 
     if (homing->phase == HOMING_SET) {
-        motion_set_position(homing->motion, lumi_rig_position_step(homing->rig, position) +
-                                                motion_position(homing->motion) - homing->mark);
+        motion_set_position(homing->motion, step + motion_position(homing->motion) - homing->mark);
         homing->result = HOMING_DONE;
     } else {
         homing->result = HOMING_FAILED;

@@ -1,0 +1,2 @@
+add_executable(bench_motion bench_motion.c)
+target_link_libraries(bench_motion PRIVATE lumi_flags lumi_firmware_core lumi_mechanism)
