@@ -184,7 +184,7 @@ static void poll_external(struct core *core)
         poll_shoot(core);
     } else if (s->intent == SWEEP_TO_REST) {
         sweep_done(core);
-    } else if (reached) {
+    } else if (reached && core->safety.raw[BOARD_IN_REACHED]) {
         s->ready_at = core->now + settle_ticks(core);
         take_group(core);
     } else if (core->now >= s->until) {

@@ -43,6 +43,7 @@ struct bench {
     int supply_mv;
     bool mark_hidden;       /* the index switch is broken */
     uint64_t last_step;     /* tick */
+    uint64_t brake_at;      /* tick of its last change */
     uint64_t *step_at;      /* of each step … */
     int64_t *step_position; /* … and where it led */
     int step_count;
@@ -85,6 +86,13 @@ static void bench_step(void *context, uint64_t at, bool forward)
 {
     struct bench *b = context;
 
+    /* What must hold at every step of every test. */
+    assert_true(b->outputs[BOARD_OUT_ENABLE]);
+    assert_false(b->inputs[BOARD_IN_ESTOP]);
+    if (b->rig.control.safety.brake_fitted && !b->rig.string.held)
+        assert_true(b->outputs[BOARD_OUT_BRAKE] && at >= b->brake_at + DROP_STRING_BRAKE_TICKS);
+    assert_true(motion_known(&b->core->motion) || b->core->state == lumi_wire_State_HOMING ||
+                b->core->state == lumi_wire_State_STOPPING || motion_starved(&b->core->motion));
     b->position += forward ? 1 : -1;
     b->last_step = at;
     if (b->step_count < BENCH_STEPS) {
@@ -109,6 +117,8 @@ static void bench_output(void *context, uint64_t at, enum board_output output, b
     struct bench *b = context;
 
     b->outputs[output] = active;
+    if (output == BOARD_OUT_BRAKE)
+        b->brake_at = at;
     if (output == BOARD_OUT_LAMP && b->lamp_count < 256)
         b->lamp_at[b->lamp_count++] = at;
 }
@@ -226,6 +236,8 @@ static void bench_beat(struct bench *b)
     size_t size;
 
     host_board_run(b->board, host_board_now(b->board) + BENCH_SECOND / 500);
+    if (b->core->has_profile && !b->rig.string.held && !b->outputs[BOARD_OUT_ENABLE]) /* what else holds the arm? */
+        assert_true(!b->outputs[BOARD_OUT_BRAKE] && host_board_now(b->board) >= b->brake_at + DROP_STRING_BRAKE_TICKS);
     uint64_t now = core_ns(host_board_now(b->board));
     while ((size = host_board_link_pull(b->board, BOARD_LINK_USB, data, sizeof data)) > 0)
         if (!b->mute)

@@ -79,6 +79,47 @@ static void an_emergency_stop_stops_within_a_step(void **state)
     }
 }
 
+static void a_motor_goes_off_only_when_the_brake_holds(void **state)
+{
+    struct lumi_rig rig;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("bar2", &rig, NULL), LUMI_OK);
+    rig.control.safety.brake_fitted = true;
+    rig.control.safety.reactions[LUMI_RIG_FAULT_ESTOP].motor = LUMI_RIG_MOTOR_OFF;
+    struct bench *b = bench_create(&rig);
+    bench_home(b);
+    bench_run(b, 2);
+    assert_false(b->outputs[BOARD_OUT_BRAKE]); /* at rest it holds */
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(jog, .turns = 0.3)), lumi_wire_Result_DONE);
+    bench_run(b, 2);
+    assert_true(b->outputs[BOARD_OUT_BRAKE]);
+    bench_set_input(b, BOARD_IN_ESTOP, true);
+    bench_run(b, 0.1);
+    assert_true(b->outputs[BOARD_OUT_ENABLE]);
+    assert_false(b->outputs[BOARD_OUT_BRAKE]);
+    bench_run(b, 0.3);
+    assert_false(b->outputs[BOARD_OUT_ENABLE]);
+    assert_int_equal(b->core->state, lumi_wire_State_STOPPED_LOST);
+    bench_set_input(b, BOARD_IN_ESTOP, false);
+    bench_run(b, 0.1);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_DONE);
+    bench_home(b);
+    assert_true(b->outputs[BOARD_OUT_ENABLE]);
+    /* The bench's direct hand cannot drop the arm either. */
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(set_output, lumi_wire_SetOutput_Output_BRAKE_OPEN, true)),
+                     lumi_wire_Result_DONE);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(set_output, lumi_wire_SetOutput_Output_ENABLE, false)),
+                     lumi_wire_Result_REFUSED);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(set_output, lumi_wire_SetOutput_Output_BRAKE_OPEN, false)),
+                     lumi_wire_Result_DONE);
+    bench_run(b, 0.5);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(set_output, lumi_wire_SetOutput_Output_ENABLE, false)),
+                     lumi_wire_Result_DONE);
+    assert_int_equal(b->core->state, lumi_wire_State_LOST);
+    bench_destroy(b);
+}
+
 static void the_hosts_emergency_stop_is_the_same(void **state)
 {
     const struct lumi_rig_safety fitted = {0};
@@ -302,6 +343,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_emergency_stop_stops_within_a_step),
+        cmocka_unit_test(a_motor_goes_off_only_when_the_brake_holds),
         cmocka_unit_test(the_hosts_emergency_stop_is_the_same),
         cmocka_unit_test(the_strings_end_ramps_down_and_only_lets_wind_up),
         cmocka_unit_test(a_slack_string_halts_and_holds),
