@@ -252,7 +252,10 @@ static void put_value(char *text, size_t size, size_t *length, double value, con
 {
     char digits[G_ASCII_DTOSTR_BUF_SIZE];
 
-    put(text, size, length, " %s%s", g_ascii_dtostr(digits, sizeof digits, value), unit);
+    g_ascii_formatd(digits, sizeof digits, "%.15g", value);
+    if (g_ascii_strtod(digits, NULL) != value)
+        g_ascii_dtostr(digits, sizeof digits, value);
+    put(text, size, length, " %s%s", digits, unit);
 }
 
 size_t sim_fault_script_print(const struct sim_fault_script *script, char *text, size_t size)

@@ -67,6 +67,8 @@ static void heard_input(void *context, enum board_input input, bool active, uint
 {
     struct sim_machine *m = context;
 
+    if (input == BOARD_IN_ESTOP)
+        g_array_append_val(m->estops, at);
     host_board_input(m->board, input, active, at);
 }
 
@@ -275,9 +277,6 @@ const uint64_t *sim_machine_start_ticks(const struct sim_machine *m, int *count)
 
 void sim_machine_estop(struct sim_machine *m, bool pressed)
 {
-    if (pressed == sim_mechanics_input(m->mechanics, BOARD_IN_ESTOP))
-        return;
-    g_array_append_val(m->estops, m->now);
     sim_mechanics_force_input(m->mechanics, BOARD_IN_ESTOP, pressed ? SIM_FORCE_ACTIVE : SIM_FORCE_NONE);
 }
 

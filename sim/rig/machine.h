@@ -33,7 +33,8 @@ struct host_board *sim_machine_board(struct sim_machine *machine);
 /* Things that will go wrong (faults.h); stays the caller's and is not changed. NULL: none. */
 void sim_machine_set_faults(struct sim_machine *machine, const struct sim_fault_script *script);
 
-uint64_t sim_machine_now(const struct sim_machine *machine); /* ticks */
+uint64_t sim_machine_now(const struct sim_machine *machine);      /* ticks */
+uint32_t sim_machine_restarts(const struct sim_machine *machine); /* that the host has seen */
 double sim_machine_seconds(const struct sim_machine *machine);
 void sim_machine_run(struct sim_machine *machine, double seconds);
 /* Until `done` says so (asked after everything that happens), or so many seconds have passed: false. */
@@ -49,12 +50,12 @@ int sim_machine_request(struct sim_machine *machine, lumi_wire_Request *request,
                         struct lumi_error *error);
 /* Profile into the board's flash. */
 int sim_machine_configure(struct sim_machine *machine, const struct lumi_rig *rig, struct lumi_error *error);
-/* Homes and waits until it is done. */
+/* Homes and waits until it is done, at most half an hour; LUMI_ERR_IO where the board restarts meanwhile. */
 int sim_machine_home(struct sim_machine *machine, bool wind_up, int turn, struct lumi_error *error);
 int sim_machine_load_plan(struct sim_machine *machine, const struct lumi_plan *plan, struct lumi_error *error);
 /* Starts the plan that was loaded; does not wait. */
 int sim_machine_start(struct sim_machine *machine, int first_shot, bool only_missing, struct lumi_error *error);
-/* Until the sweep has ended, however; LUMI_ERR_IO if it has not in so many seconds. */
+/* Until the sweep has ended, however; LUMI_ERR_IO if it has not in so many seconds, or the board has restarted. */
 int sim_machine_wait_sweep(struct sim_machine *machine, double seconds, struct lumi_error *error);
 /* Releases all faults that stand. */
 int sim_machine_clear(struct sim_machine *machine, struct lumi_error *error);
@@ -85,7 +86,7 @@ size_t sim_machine_get(struct sim_machine *machine, uint8_t *data, size_t size);
 
 /* ---- what a test judges by ---- */
 
-/* Every step pulse: its tick. And the e-stop: ticks at which it was pressed and let go, in turn. */
+/* Every step pulse: its tick. And the e-stop's edges, pressed and let go in turn. */
 const uint64_t *sim_machine_step_ticks(const struct sim_machine *machine, int *count);
 const uint64_t *sim_machine_estop_ticks(const struct sim_machine *machine, int *count);
 /* Ticks at which the board started, the first of them 0. */

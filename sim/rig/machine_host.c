@@ -135,6 +135,7 @@ int sim_machine_configure(struct sim_machine *m, const struct lumi_rig *rig, str
 
 struct awaited {
     int from, kind;
+    uint32_t starts; /* of the board, when the waiting began */
 };
 
 /* Leaves `from` at the event that was awaited. */
@@ -145,20 +146,30 @@ static bool has_come(struct sim_machine *m, void *context)
     for (; awaited->from < (int)m->events->len; awaited->from++)
         if (g_array_index(m->events, struct sim_machine_event, awaited->from).event.which_kind == awaited->kind)
             return true;
-    return false;
+    return m->starts != awaited->starts;
+}
+
+/* The event, where has_come was ended by it. */
+static const lumi_wire_Event *come(const struct sim_machine *m, const struct awaited *awaited)
+{
+    return awaited->from < (int)m->events->len
+               ? &g_array_index(m->events, struct sim_machine_event, awaited->from).event
+               : NULL;
 }
 
 int sim_machine_home(struct sim_machine *m, bool wind_up, int turn, struct lumi_error *error)
 {
     lumi_wire_Request request = {.which_command = lumi_wire_Request_home_tag};
-    struct awaited homed = {(int)m->events->len, lumi_wire_Event_homed_tag};
+    struct awaited homed = {(int)m->events->len, lumi_wire_Event_homed_tag, m->starts};
 
     request.command.home.wind_up = wind_up;
     request.command.home.turn = turn;
     LUMI_TRY(sim_machine_request(m, &request, NULL, error));
     if (!sim_machine_run_until(m, has_come, &homed, 1800))
         return lumi_fail(error, LUMI_ERR_IO, "homing does not end");
-    const lumi_wire_Event *event = &g_array_index(m->events, struct sim_machine_event, homed.from).event;
+    const lumi_wire_Event *event = come(m, &homed);
+    if (!event)
+        return lumi_fail(error, LUMI_ERR_IO, "the board restarted while homing");
     if (!event->kind.homed.found)
         return lumi_fail(error, LUMI_ERR_NOTFOUND, "homing failed: %s", event->kind.homed.text);
     return LUMI_OK;
@@ -188,10 +199,12 @@ int sim_machine_start(struct sim_machine *m, int first_shot, bool only_missing, 
 
 int sim_machine_wait_sweep(struct sim_machine *m, double seconds, struct lumi_error *error)
 {
-    struct awaited ended = {(int)m->events->len, lumi_wire_Event_sweep_ended_tag};
+    struct awaited ended = {(int)m->events->len, lumi_wire_Event_sweep_ended_tag, m->starts};
 
     if (!sim_machine_run_until(m, has_come, &ended, seconds))
         return lumi_fail(error, LUMI_ERR_IO, "the sweep has not ended after %g s", seconds);
+    if (!come(m, &ended))
+        return lumi_fail(error, LUMI_ERR_IO, "the board restarted in the sweep");
     return LUMI_OK;
 }
 
@@ -257,6 +270,11 @@ const struct sim_machine_event *sim_machine_events(const struct sim_machine *m, 
 {
     *count = (int)m->events->len;
     return (const struct sim_machine_event *)(const void *)m->events->data;
+}
+
+uint32_t sim_machine_restarts(const struct sim_machine *m)
+{
+    return m->starts;
 }
 
 uint32_t sim_machine_events_lost(const struct sim_machine *m)

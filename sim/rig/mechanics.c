@@ -200,6 +200,11 @@ double sim_mechanics_fallen(const struct sim_mechanics *m)
     return m->platform.fallen_total;
 }
 
+double sim_mechanics_dropped(const struct sim_mechanics *m)
+{
+    return m->platform.dropped_total;
+}
+
 int64_t sim_mechanics_missed_steps(const struct sim_mechanics *m)
 {
     return m->platform.missed;

@@ -76,6 +76,8 @@ double sim_mechanics_drop(const struct sim_mechanics *mechanics);  /* rad, true,
 double sim_mechanics_swing(const struct sim_mechanics *mechanics);
 bool sim_mechanics_falling(const struct sim_mechanics *mechanics);  /* nothing holds the arm */
 double sim_mechanics_fallen(const struct sim_mechanics *mechanics); /* rad, by which it has fallen so far, ever */
+/* rad, by which it has dropped into a string that hung loose (paid out behind a closed brake or a snag), ever */
+double sim_mechanics_dropped(const struct sim_mechanics *mechanics);
 int64_t sim_mechanics_missed_steps(const struct sim_mechanics *mechanics); /* full steps */
 int64_t sim_mechanics_steps(const struct sim_mechanics *mechanics); /* pulses so far, backward ones counted down */
 /* The place, in microsteps of the truth, to which the motor's field points: where the platform comes to rest. */

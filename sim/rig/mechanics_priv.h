@@ -32,7 +32,7 @@ struct sim_platform {
     double given;                     /* rad: what the string has been paid out for */
     double loose;                     /* rad: given, but not taken by the arm (brake, snag) */
     double fallen, fall_speed;        /* rad, rad/s */
-    double fallen_total;
+    double fallen_total, dropped_total;
     int64_t missed, slip; /* full steps: lost so far; still to be lost */
     bool snagged;
     bool brake_wanted, brake_holds;

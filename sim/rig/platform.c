@@ -22,7 +22,7 @@
 #define HOLD_GRACE 0.020   /* s without brake and current until the arm's inertia gives in */
 #define FALL_GRAVITY 12.0  /* rad/s², of an arm that nothing holds */
 #define FALL_END 3.0       /* rad, where it hits the tripod */
-#define SUPPLY_LOCKOUT 9.0 /* V, below which a stepper driver switches itself off */
+#define SUPPLY_LOCKOUT 9.0 /* V, below which a stepper driver switches itself off and a brake closes */
 
 static double full_step(const struct sim_mechanics *m)
 {
@@ -222,7 +222,7 @@ static void holding(struct sim_mechanics *m)
         p->rest += p->loose;
         sim_oscillator_jump(&p->arm, p->loose, p->omega_arm, m->options.arm_damping);
         if (p->loose > m->options.slack_angle)
-            p->fallen_total += p->loose;
+            p->dropped_total += p->loose;
         p->loose = 0;
     }
     if (m->truth.string.held || p->energised || p->brake_holds) {
@@ -236,7 +236,8 @@ static void holding(struct sim_mechanics *m)
 void sim_platform_powers(struct sim_mechanics *m)
 {
     struct sim_platform *p = &m->platform;
-    bool fitted = m->truth.control.safety.brake_fitted, open = m->outputs[BOARD_OUT_BRAKE];
+    bool fitted = m->truth.control.safety.brake_fitted,
+         open = m->outputs[BOARD_OUT_BRAKE] && m->supply > SUPPLY_LOCKOUT;
     bool energised = m->outputs[BOARD_OUT_ENABLE] && !m->driver_fault && m->supply > SUPPLY_LOCKOUT;
 
     if (energised && !p->energised) {

@@ -244,7 +244,7 @@ static void a_string_that_snags_hangs_slack_and_says_so(void **state)
     assert_true(sim_mechanics_input(bench.m, BOARD_IN_SLACK));
     assert_true(fabs(sim_mechanics_drop(bench.m) - drop) < 0.1 * DEGREE);
     sim_mechanics_snag(bench.m, false);
-    assert_true(sim_mechanics_fallen(bench.m) > 1 * DEGREE); /* it drops into the string */
+    assert_true(sim_mechanics_dropped(bench.m) > 1 * DEGREE); /* it drops into the string */
     sim_mechanics_destroy(bench.m);
 }
 
