@@ -109,13 +109,19 @@ uint64_t firing_half(const struct firing *firing, int exposure)
     return firing->exposures[exposure] / 2;
 }
 
+/* A focus line falls with the trigger and is up again so long before the next one. */
+static uint32_t focus_ticks(const struct firing_camera *camera)
+{
+    return camera->focus_channel >= 0 ? camera->focus_lead : 0;
+}
+
 uint64_t firing_lead(const struct firing *firing, int exposure)
 {
     uint64_t lead = 0;
 
     for (int i = 0; i < firing->camera_count; i++) {
         const struct firing_camera *c = &firing->cameras[i];
-        lead = larger(lead, (uint64_t)c->lag + (c->focus_channel >= 0 ? c->focus_lead : 0));
+        lead = larger(lead, (uint64_t)c->lag + focus_ticks(c));
     }
     return lead + firing_half(firing, exposure) + FIRING_MARGIN_TICKS;
 }
@@ -128,7 +134,7 @@ uint64_t firing_spacing(const struct firing *firing, int from, int to, uint64_t 
         const struct firing_camera *c = &firing->cameras[i];
         uint64_t after = firing->exposures[from] - firing_half(firing, from);
         uint64_t rest = after + larger(gap, c->busy) + c->lag + firing_half(firing, to);
-        uint64_t line = c->pulse + LINE_GAP_TICKS + firing_half(firing, to);
+        uint64_t line = c->pulse + LINE_GAP_TICKS + focus_ticks(c) + firing_half(firing, to);
         uint64_t begun = firing_half(firing, from);
         spacing = larger(spacing, larger(rest, line > begun ? line - begun : 0));
     }
@@ -183,7 +189,7 @@ static bool queue_camera(struct firing *firing, struct firing_camera *c, struct 
         open = firing_queue(firing, &(struct firing_edge){rise - c->focus_lead, focus, 0, index}, stops);
     open = open && firing_queue(firing, &(struct firing_edge){rise, line, 0, index}, stops);
     open = open && firing_queue(firing, &(struct firing_edge){fall, 0, line | focus, index}, stops);
-    c->free_at = larger(begin + firing->exposures[slot->exposure] + c->busy, fall + LINE_GAP_TICKS);
+    c->free_at = larger(begin + firing->exposures[slot->exposure] + c->busy, fall + LINE_GAP_TICKS + focus_ticks(c));
     slot->end = larger(slot->end, fall);
     return open;
 }

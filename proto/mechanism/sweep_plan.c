@@ -1,6 +1,7 @@
 /* The plan of a sweep: its totals and times. Linked into firmware: no stdio. */
 #include "proto/mechanism/sweep_plan_priv.h"
 
+#include "proto/mechanism/kinematics.h"
 #include "proto/mechanism/ramp_time.h"
 
 #include <math.h>
@@ -85,7 +86,7 @@ double lumi_plan_exposure_spacing(const struct lumi_plan *plan, const struct lum
         double lines = t->focus_lead + t->pulse + LUMI_PLAN_PULSE_GAP;
         least = fmax(least, fmax(camera, lines));
     }
-    return least;
+    return least + LUMI_PLAN_SHOT_MARGIN;
 }
 
 double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi_rig *rig, int k)
@@ -97,10 +98,10 @@ double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi
     return offset;
 }
 
-double plan_position_wait(const struct lumi_plan *plan, const struct lumi_rig *rig)
+double plan_position_wait(const struct lumi_plan *plan, const struct lumi_rig *rig, double distance)
 {
     const struct lumi_rig_motion *m = &rig->control.motion;
-    double move = lumi_move_time(2 * LUMI_PI / plan->positions, m->speed_max, m->acceleration_max, m->jerk_max);
+    double move = lumi_move_time(distance, m->speed_max, m->acceleration_max, m->jerk_max);
     double lead = 0;
 
     /* Focus lines and triggers that must be up before the exposure may go up in the move, but not before it. */
@@ -120,11 +121,6 @@ double plan_bracket_length(const struct lumi_plan *plan, const struct lumi_rig *
         if (takes_part(plan, rig, i))
             end = fmax(end, rig->control.triggers[i].pulse - rig->control.triggers[i].shutter_lag);
     return lumi_plan_exposure_offset(plan, rig, last) + end;
-}
-
-double plan_position_busy(const struct lumi_plan *plan, const struct lumi_rig *rig)
-{
-    return plan_position_wait(plan, rig) + plan_bracket_length(plan, rig) + LUMI_PLAN_MOVE_MARGIN;
 }
 
 /* ---- While turning ---- */
@@ -188,7 +184,10 @@ double lumi_plan_seconds(const struct lumi_plan *plan, const struct lumi_rig *ri
     if (plan->mode != LUMI_PLAN_START_STOP)
         return lumi_plan_span(plan) * plan->turn_time + 2 * ramp_seconds(plan, rig) + up_seconds(plan, rig) +
                held_seconds(plan);
-    return moves * lumi_plan_position_seconds(plan) + plan_position_busy(plan, rig);
+    /* The first position is approached from where its backlash is taken up. */
+    double first = fmax(rig->control.motion.backlash, 2 * LUMI_PI / lumi_rig_steps_per_turn(rig));
+    return moves * lumi_plan_position_seconds(plan) + plan_bracket_length(plan, rig) +
+           plan_position_wait(plan, rig, moves ? 2 * LUMI_PI / plan->positions : first);
 }
 
 double lumi_plan_blur(const struct lumi_plan *plan, const struct lumi_rig *rig)

@@ -42,6 +42,7 @@ struct lumi_plan {
  */
 #define LUMI_PLAN_BLUR 1.0
 #define LUMI_PLAN_PULSE_GAP 0.005    /* s a trigger line is low between two pulses, at least */
+#define LUMI_PLAN_SHOT_MARGIN 0.001  /* s between two shots that the board keeps for itself */
 #define LUMI_PLAN_CRUISE_MARGIN 0.05 /* s of constant speed before the first exposure and behind the last */
 #define LUMI_PLAN_MOVE_MARGIN 0.02   /* s of a position's time that the board keeps for itself */
 

@@ -116,8 +116,9 @@ static int check_turning(const struct lumi_plan *plan, const struct lumi_rig *ri
 static int check_start_stop(const struct lumi_plan *plan, const struct lumi_rig *rig, struct lumi_error *error)
 {
     const struct lumi_rig_motion *m = &rig->control.motion;
-    double move = lumi_move_time(2 * LUMI_PI / plan->positions, m->speed_max, m->acceleration_max, m->jerk_max);
-    double wait = plan_position_wait(plan, rig), busy = plan_position_busy(plan, rig);
+    double distance = 2 * LUMI_PI / plan->positions, wait = plan_position_wait(plan, rig, distance);
+    double move = lumi_move_time(distance, m->speed_max, m->acceleration_max, m->jerk_max);
+    double busy = wait + plan_bracket_length(plan, rig) + LUMI_PLAN_MOVE_MARGIN;
     double apart = lumi_plan_position_seconds(plan), cameras = lumi_plan_exposure_offset(plan, rig, plan->bracket);
 
     if (busy > apart)

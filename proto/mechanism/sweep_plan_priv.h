@@ -4,9 +4,8 @@
 
 #include "proto/mechanism/sweep_plan.h"
 
-/* From the move's begin to the first exposure's, from there until all is done, and both with the board's own margin. */
-double plan_position_wait(const struct lumi_plan *plan, const struct lumi_rig *rig);
+/* From the begin of a move over `distance` to the first exposure's, and from there until all is done. */
+double plan_position_wait(const struct lumi_plan *plan, const struct lumi_rig *rig, double distance);
 double plan_bracket_length(const struct lumi_plan *plan, const struct lumi_rig *rig);
-double plan_position_busy(const struct lumi_plan *plan, const struct lumi_rig *rig);
 
 #endif

@@ -214,10 +214,10 @@ static void a_plan_that_outruns_motor_board_or_cameras_is_refused(void **state)
     rig = builtin("bar2");
     plan = plan_for(&rig);
     rig.control.triggers[1].busy = 0.4;
-    cannot(&plan, &rig, "positions pass every 0.416667 s, the cameras take a picture every 0.454 s");
+    cannot(&plan, &rig, "positions pass every 0.416667 s, the cameras take a picture every 0.455 s");
     rig.control.triggers[1].busy = 0;
     rig.control.triggers[1].pulse = 0.42;
-    cannot(&plan, &rig, "take a picture every 0.425 s");
+    cannot(&plan, &rig, "take a picture every 0.426 s");
     plan.cameras = 1; /* the other one can */
     can(&plan, &rig);
 }
