@@ -216,13 +216,12 @@ static int64_t pulses_to(double x)
     return (int64_t)floor(x + 0.5 - 1e-6);
 }
 
-/* No two pulses may be further apart than 2^30 ticks: one step in the cruise, and one from rest. */
+/* Intervals stay below 2^30 ticks, and long enough for an interrupt each. */
 static bool limits_in_range(const struct motion_limits *limits)
 {
-    if (!(limits->speed > 0 && limits->acceleration > 0 && limits->jerk > 0))
-        return false;
-    double slowest = cbrt(6 / limits->jerk) + sqrt(2 / limits->acceleration) + 1 / limits->speed;
-    return slowest * BOARD_TICK_HZ < 1073741824.0 && limits->speed * 100 <= BOARD_TICK_HZ;
+    return limits->speed > 0 && limits->acceleration > 0 && limits->jerk > 0 &&
+           limits->speed <= BOARD_TICK_HZ / 100.0 &&
+           lumi_ramp_slowest_step(limits->speed, limits->acceleration, limits->jerk) <= LUMI_RAMP_STEP_SECONDS;
 }
 
 /* Plans the first segments: the first pulse comes at tick *pulse, the next so many ticks later (0: there is none). */

@@ -32,7 +32,7 @@ void motion_set_driver(struct motion *motion, double step_pulse, double directio
 /* Starts a move from rest to `target` (a step number), within the limits. Its curve begins at tick `at`, or as soon as
  * it can (some 2 ms from now, and not before the curve of the last move has ended). A move that is long enough reaches
  * limits.speed exactly and holds it: its cruise. False: not at rest, halted and not released, a position that is not
- * known, limits out of range (steps slower than one in 25 s), or nothing to do. */
+ * known, limits out of range (lumi_ramp_slowest_step), or nothing to do. */
 bool motion_start(struct motion *motion, int64_t target, const struct motion_limits *limits, uint64_t at);
 /* The same from a position that need not be known, `steps` on: for homing only. */
 bool motion_seek(struct motion *motion, int64_t steps, const struct motion_limits *limits);

@@ -33,3 +33,8 @@ double lumi_move_time(double distance, double speed, double acceleration, double
 
     return 2 * ramp + fmax(distance - reached * ramp, 0) / reached;
 }
+
+double lumi_ramp_slowest_step(double speed, double acceleration, double jerk)
+{
+    return cbrt(6 / jerk) + sqrt(2 / acceleration) + 1 / speed;
+}

@@ -18,6 +18,11 @@ double lumi_move_speed(double distance, double speed, double acceleration, doubl
 /* Seconds from rest to rest over `distance`. */
 double lumi_move_time(double distance, double speed, double acceleration, double jerk);
 
+/* Seconds, at most, between two steps of a move with these limits in steps, wherever it is stopped: a step from rest
+ * and one in the cruise. The board makes LUMI_RAMP_STEP_SECONDS. */
+double lumi_ramp_slowest_step(double speed, double acceleration, double jerk);
+#define LUMI_RAMP_STEP_SECONDS 12.0
+
 #ifdef __cplusplus
 }
 #endif

@@ -3,6 +3,8 @@
 #include "proto/mechanism/ramp_time.h"
 #include "proto/mechanism/rig_priv.h"
 
+#include <math.h>
+
 static int check_motion(const struct lumi_rig *rig, struct lumi_error *error)
 {
     const struct lumi_rig_motion *m = &rig->control.motion;
@@ -28,6 +30,11 @@ static int check_motion(const struct lumi_rig *rig, struct lumi_error *error)
         RIG_REFUSE("motion: home_speed of %g rad/s: 0.0001 to speed_max, %g, wanted", m->home_speed, m->speed_max);
     if (!rig_within(m->wind_speed, 1e-4, m->speed_max))
         RIG_REFUSE("motion: wind_speed of %g rad/s: 0.0001 to speed_max, %g, wanted", m->wind_speed, m->speed_max);
+    double steps = lumi_rig_steps_per_turn(rig) / (2 * LUMI_PI), slow = fmin(m->home_speed / 4, m->wind_speed);
+    double apart = lumi_ramp_slowest_step(slow * steps, m->acceleration_max * steps, m->jerk_max * steps);
+    if (!(apart <= LUMI_RAMP_STEP_SECONDS))
+        RIG_REFUSE("motion: home_speed of %g or wind_speed of %g rad/s is too low: steps %g s apart, at most %g",
+                   m->home_speed, m->wind_speed, apart, LUMI_RAMP_STEP_SECONDS);
     if (!rig_within(m->backlash, 0, LUMI_PI / 4))
         RIG_REFUSE("motion: backlash of %g rad: 0 to %g wanted", m->backlash, LUMI_PI / 4);
     if (!rig_within(m->index_window, 0, LUMI_PI / 2))

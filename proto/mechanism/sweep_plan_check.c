@@ -97,6 +97,11 @@ static int check_turning(const struct lumi_plan *plan, const struct lumi_rig *ri
                    m->speed_max, 2 * LUMI_PI / m->speed_max);
     if (rate > LUMI_RIG_STEP_RATE_MAX)
         RIG_REFUSE("a turn in %g s is %g steps/s, the board makes %g", plan->turn_time, rate, LUMI_RIG_STEP_RATE_MAX);
+    double steps = lumi_rig_steps_per_turn(rig) / (2 * LUMI_PI);
+    double slowest = lumi_ramp_slowest_step(rate, m->acceleration_max * steps, m->jerk_max * steps);
+    if (slowest > LUMI_RAMP_STEP_SECONDS)
+        RIG_REFUSE("a turn in %g s has steps %g s apart, at most %g are allowed", plan->turn_time, slowest,
+                   LUMI_RAMP_STEP_SECONDS);
     double blur = lumi_plan_blur(plan, rig), most = plan->blur_max > 0 ? plan->blur_max : LUMI_PLAN_BLUR;
     if (!(blur <= most))
         RIG_REFUSE("an exposure of %g s at a turn in %g s smears %g pixels, %g are allowed (%g s)", plan->exposures[0],

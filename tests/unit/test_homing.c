@@ -211,6 +211,11 @@ static void the_turn_is_the_one_it_stands_in_and_the_operator_says_which(void **
 
     assert_home(p, HOMING_INDEX, 7, 0, 7);
     plant_free(p);
+    p = plant_new("bar2", -300); /* before turn 0 */
+    const char *reason;
+    assert_int_equal(home(p, HOMING_INDEX, -1, &reason), HOMING_DONE);
+    assert_int_equal(motion_position(&p->motion), (int64_t)(motor(p) - ceil(p->play)));
+    plant_free(p);
     p = plant_new("bar2", 28800 * 0.4);
     p->rig.gear_motor = 91; /* turns of steps and a fraction */
     p->rig.gear_platform = 9;

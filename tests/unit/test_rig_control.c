@@ -260,6 +260,8 @@ static void limits_of_motion_that_cannot_be_are_refused(void **state)
     WITH(m->jerk_max = 1e-4, "jerk_max is too low");
     WITH(m->home_speed = 2, "home_speed of 2 rad/s");
     WITH(m->home_speed = NAN, "home_speed of nan");
+    WITH((m->home_speed = 1e-4, rig.microsteps = 1), "home_speed of 0.0001 or wind_speed of 0.785398 rad/s is too low");
+    WITH((m->wind_speed = 1e-4, rig.microsteps = 1), "wind_speed of 0.0001 rad/s is too low: steps 35.");
     WITH(m->wind_speed = 0, "wind_speed of 0");
     WITH(m->backlash = -0.1, "backlash of -0.1");
     WITH(m->backlash = NAN, "backlash of nan");

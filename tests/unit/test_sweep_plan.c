@@ -266,6 +266,8 @@ static void numbers_that_cannot_be_are_refused(void **state)
     WITH(plan.turns = 300, "300 turns");
     WITH(plan.first_turn = -1, "first turn -1");
     WITH(plan.turn_time = NAN, "a turn in nan s");
+    WITH((plan.turn_time = 86400, rig.microsteps = 1), "steps 48.");
+    rig.microsteps = 16;
     WITH(plan.turn_time = 0, "a turn in 0 s");
     WITH(plan.turn_time = INFINITY, "a turn in inf s");
     WITH(plan.position_time = NAN, "a position in nan s");
