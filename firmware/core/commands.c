@@ -73,10 +73,6 @@ static void home(struct core *core, const lumi_wire_Home *home_command, lumi_wir
         core_rest(core);
         return;
     }
-    if (!home_command->wind_up && fitted->slack_fitted && core->safety.inputs[BOARD_IN_SLACK]) {
-        core_refuse(reply, lumi_wire_Result_REFUSED, "home: the string hangs loose; wind it up");
-        return;
-    }
     core->home_goal = home_command->wind_up ? HOMING_WOUND : HOMING_INDEX;
     core->home_turn = home_command->turn;
     core->begun = false;
@@ -120,6 +116,10 @@ static void test_triggers(struct core *core, const lumi_wire_TestTriggers *test,
         return;
     if (!(test->exposure >= 0 && test->exposure <= 60) || !(test->gap >= 0 && test->gap <= 60)) {
         core_refuse(reply, lumi_wire_Result_BAD, "test: exposure and gap are 0 to 60 s");
+        return;
+    }
+    if (firing_busy_now(&core->firing)) {
+        core_refuse(reply, lumi_wire_Result_REFUSED, "test: a trigger is still up");
         return;
     }
     if (!firing_test(&core->firing, &core->rig, test->cameras, test->exposure, test->gap)) {

@@ -33,6 +33,7 @@ bool core_move(struct core *core, int64_t target, const struct motion_limits *li
         standing &= ~(1u << LUMI_RIG_FAULT_HOST_LOST); /* its reaction is to go on */
     if (standing != 0 || motion_halted(&core->motion))
         return false;
+    core->safety.marked.active = false; /* it may turn the other way */
     if (motion_start(&core->motion, target, limits, at))
         return true;
     safety_raise(core, LUMI_RIG_FAULT_INTERNAL, "a move could not begin");

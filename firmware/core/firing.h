@@ -67,6 +67,8 @@ uint64_t firing_spacing(const struct firing *firing, int from, int to, uint64_t 
 /* Nothing more is fired: what has begun is finished (`finish`), or all lines fall at once and it is lost. What is
  * queued and has not begun goes back to PLANNED. From interrupts only with finish = false. */
 void firing_stop(struct firing *firing, bool finish);
+/* After a stop at once: record pulses go out again; shots wait for firing_begin. At rest. */
+void firing_release(struct firing *firing);
 /* The platform is not where it should be: what has begun is finished and lost. */
 void firing_spoil(struct firing *firing);
 bool firing_begun(const struct firing *firing);    /* a shot is under way */

@@ -198,6 +198,12 @@ void firing_stop(struct firing *firing, bool finish)
     board->unlock(board->port, lock);
 }
 
+void firing_release(struct firing *firing)
+{
+    if (firing->gate == GATE_OFF)
+        firing->gate = GATE_FINISH;
+}
+
 void firing_spoil(struct firing *firing)
 {
     for (int i = 0; i < FIRING_SLOTS; i++)

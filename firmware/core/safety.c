@@ -175,6 +175,8 @@ const char *safety_clear(struct core *core, uint32_t faults)
     motion_release(&core->motion);
     if (s->estop_seen)
         motion_halt(&core->motion);
+    if (core->has_profile && !s->estop_seen)
+        sweep_cleared(core);
     for (int i = 0; i < LUMI_RIG_FAULTS; i++)
         if (faults & BIT(i))
             core_report_fault(core, i, false, "");
@@ -243,15 +245,14 @@ static void tell_verdict(struct core *core, enum index_verdict verdict)
         safety_raise(core, LUMI_RIG_FAULT_INDEX_EARLY, "the index mark came where it should not");
 }
 
-/* The platform's own speed, by the time between two index marks a turn apart. */
+/* The platform's own speed, by the time between two index marks; within one move, or at rest, they are a turn apart. */
 static void watch_turn(struct core *core, const struct debounce_edge *edge)
 {
     struct safety *s = &core->safety;
-    const int64_t apart = edge->position - s->marked.position;
     const double limit = core->rig.control.safety.overspeed;
 
-    if (s->marked.active && limit > 0 && fabs((double)apart) > core->steps_per_turn / 2 &&
-        !homing_active(&core->homing) && (double)(edge->at - s->marked.at) * limit < 2 * LUMI_PI * BOARD_TICK_HZ)
+    if (s->marked.active && limit > 0 && !homing_active(&core->homing) &&
+        (double)(edge->at - s->marked.at) * limit < 2 * LUMI_PI * BOARD_TICK_HZ)
         safety_raise(core, LUMI_RIG_FAULT_OVERSPEED, "a turn took less time than it may");
     s->marked = *edge;
 }

@@ -220,10 +220,10 @@ bool sweep_end_with_row(struct core *core)
 {
     struct sweep *s = &core->sweep;
     const uint32_t row = (uint32_t)core->plan.positions * (uint32_t)core->plan.bracket;
+    uint32_t in = s->phase == SWEEP_SHOOT ? s->group_first : s->shot;
 
     if (!s->active || s->external || s->intent == SWEEP_TO_REST || core->state != lumi_wire_State_SWEEPING)
         return false;
-    /* The row of the shot that comes next, or of the last one. */
     s->intent = SWEEP_TO_ROW_END;
     s->how = lumi_wire_SweepEnded_How_HOST_LOST;
     s->wake = 0;
@@ -231,13 +231,24 @@ bool sweep_end_with_row(struct core *core)
         s->marks_end = s->mark + 1 < s->marks_end ? s->mark + 1 : s->marks_end;
         return true;
     }
-    uint32_t last = s->shot < s->end ? s->shot : s->end - 1;
-    uint32_t end = (last / row + 1) * row;
+    /* Where the next row has not begun, this one is at its end. */
+    uint32_t end = s->phase != SWEEP_SHOOT && in % row == 0 ? in : (in / row + 1) * row;
     s->end = end < s->end ? end : s->end;
     return true;
 }
 
-/* The turn marks that have been passed; `at`: now, or when a move that is under way will have passed them. */
+void sweep_cleared(struct core *core)
+{
+    struct sweep *s = &core->sweep;
+
+    if (!s->recording)
+        return;
+    s->recording = false;
+    firing_release(&core->firing);
+    firing_record(&core->firing, &core->rig, core->plan.cameras, false,
+                  core->board->now(core->board->port) + FIRING_MARGIN_TICKS);
+}
+
 void sweep_mark(struct core *core, uint64_t at)
 {
     struct sweep *s = &core->sweep;

@@ -47,6 +47,8 @@ struct sweep {
     int marks_end;       /* one past the last */
     uint64_t wake;       /* when sweep_poll has something to do; BOARD_NEVER: when something else happens */
     uint64_t until;      /* record lead, timeouts */
+    uint64_t feed_at;    /* continuous: the next shot is queued then */
+    uint64_t mark_at;    /* … the next turn mark passes; 0: not known yet */
     /* Start-stop. */
     uint64_t cycle;                  /* tick at which the position's move was due */
     uint64_t period;                 /* position to position */
@@ -69,6 +71,8 @@ void sweep_finish(struct core *core, lumi_wire_SweepEnded_How how);
 void sweep_break(struct core *core, lumi_wire_SweepEnded_How how);
 /* Goes on to the end of the row it is in; false: it is in none. */
 bool sweep_end_with_row(struct core *core);
+/* Faults are cleared: cameras that were left recording are told to stop. */
+void sweep_cleared(struct core *core);
 /* The first shot that is neither fired nor lost, or how many there are. */
 uint32_t sweep_next_shot(struct core *core);
 

@@ -63,6 +63,10 @@ static void feed(struct core *core)
     struct sweep *s = &core->sweep;
     const uint64_t lead = firing_lead(&core->firing, 0) + SWEEP_AHEAD;
 
+    if (core->now < s->feed_at) {
+        sweep_wake(core, s->feed_at);
+        return;
+    }
     for (sweep_skip(core); s->shot < s->end; s->shot++, sweep_skip(core)) {
         const double position = sweep_position(core, s->shot);
         uint64_t middle = motion_time_of(&core->motion, position);
@@ -71,14 +75,16 @@ static void feed(struct core *core)
             continue;
         }
         if (middle > core->now + lead) {
-            sweep_wake(core, middle - lead);
-            return;
+            s->feed_at = middle - lead;
+            break;
         }
         if (!firing_shoot(&core->firing, s->shot, 0, middle, position)) {
-            sweep_wake(core, core->now + RETRY_TICKS);
-            return;
+            s->feed_at = core->now + RETRY_TICKS;
+            break;
         }
     }
+    if (s->shot < s->end)
+        sweep_wake(core, s->feed_at);
 }
 
 /* Turn marks as they are passed: a poll late at most. */
@@ -87,18 +93,18 @@ static void pass_marks(struct core *core)
     struct sweep *s = &core->sweep;
 
     while (s->mark < s->marks_end) {
-        uint64_t at = motion_time_of(&core->motion, s->mark * core->steps_per_turn);
-        if (at == BOARD_NEVER)
-            return;
-        if (at > core->now) {
-            sweep_wake(core, at);
+        if (s->mark_at == 0)
+            s->mark_at = motion_time_of(&core->motion, s->mark * core->steps_per_turn);
+        if (s->mark_at > core->now) {
+            sweep_wake(core, s->mark_at);
             return;
         }
         if (video(core)) {
             lamp_send(&core->lamp, (unsigned)s->mark, core->now, core->rig.control.video.lamp_bit);
             s->turns_done = s->mark - core->plan.first_turn;
         }
-        sweep_mark(core, at);
+        sweep_mark(core, s->mark_at);
+        s->mark_at = 0;
     }
 }
 
@@ -122,6 +128,7 @@ static void poll_run(struct core *core)
     if (s->intent == SWEEP_TO_REST && !s->stopping && !firing_busy_now(&core->firing)) {
         motion_stop(&core->motion);
         s->stopping = true;
+        s->mark_at = 0; /* may not be passed any more */
     }
     if (motion_moving(&core->motion)) {
         sweep_wake(core, motion_end(&core->motion));

@@ -41,6 +41,7 @@ struct bench {
     int64_t position;
     bool inputs[BOARD_INPUTS], outputs[BOARD_OUTPUTS];
     int supply_mv;
+    int slip;               /* the platform turns so many steps a step; 0: one */
     bool mark_hidden;       /* the index switch is broken */
     uint64_t last_step;     /* tick */
     uint64_t brake_at;      /* tick of its last change */
@@ -93,7 +94,7 @@ static void bench_step(void *context, uint64_t at, bool forward)
         assert_true(b->outputs[BOARD_OUT_BRAKE] && at >= b->brake_at + DROP_STRING_BRAKE_TICKS);
     assert_true(motion_known(&b->core->motion) || b->core->state == lumi_wire_State_HOMING ||
                 b->core->state == lumi_wire_State_STOPPING || motion_starved(&b->core->motion));
-    b->position += forward ? 1 : -1;
+    b->position += (forward ? 1 : -1) * (b->slip ? b->slip : 1);
     b->last_step = at;
     if (b->step_count < BENCH_STEPS) {
         b->step_at[b->step_count] = at;

@@ -120,6 +120,87 @@ static void a_motor_goes_off_only_when_the_brake_holds(void **state)
     bench_destroy(b);
 }
 
+static void a_platform_that_runs_away_is_too_fast(void **state)
+{
+    struct lumi_rig rig;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("arc16", &rig, NULL), LUMI_OK);
+    rig.control.safety.overspeed = rig.control.motion.speed_max * 1.05;
+    struct bench *b = bench_create(&rig);
+    bench_home(b);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(jog, .turns = 3, .speed = rig.control.motion.speed_max)),
+                     lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 40);
+    b->slip = 2;
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(jog, .turns = -3, .speed = rig.control.motion.speed_max)),
+                     lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_STOPPED_LOST, 20);
+    assert_int_equal(b->faults_set, 1u << LUMI_RIG_FAULT_OVERSPEED);
+    bench_destroy(b);
+}
+
+static void cameras_left_recording_are_stopped_once_the_fault_is_cleared(void **state)
+{
+    struct lumi_rig rig;
+    struct lumi_plan plan;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("bar2", &rig, NULL), LUMI_OK);
+    struct bench *b = bench_create(&rig);
+    bench_home(b);
+    lumi_plan_init(&plan, &rig);
+    plan.mode = LUMI_PLAN_VIDEO;
+    plan.turns = 2;
+    uint32_t crc = bench_load(b, &plan);
+    b->edge_count = 0;
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(start_sweep, .plan_crc = crc)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_SWEEPING, 20);
+    bench_run(b, 40);
+    assert_int_equal(b->edge_count, 2);
+    bench_set_input(b, BOARD_IN_ESTOP, true);
+    bench_run(b, 1);
+    assert_int_equal(b->edge_count, 2);
+    assert_false(b->outputs[BOARD_OUT_LAMP]);
+    bench_set_input(b, BOARD_IN_ESTOP, false);
+    bench_run(b, 0.1);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_DONE);
+    bench_run(b, 1);
+    assert_int_equal(b->edge_count, 4);
+    /* Going on, the turn that was not recorded whole is recorded again. */
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(home, .turn = 1)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 60);
+    b->turn_marks = 0;
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(start_sweep, .plan_crc = crc, .only_missing = true)),
+                     lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 100);
+    assert_int_equal(b->turn_marks, 2);
+    assert_int_equal(b->edge_count, 8);
+    assert_int_equal(b->ended.how, lumi_wire_SweepEnded_How_COMPLETE);
+    bench_destroy(b);
+}
+
+static void winding_into_the_upper_end_stops(void **state)
+{
+    struct lumi_rig rig;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("bar2", &rig, NULL), LUMI_OK);
+    rig.control.safety.wound_fitted = true;
+    struct bench *b = bench_create(&rig);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(home, .wind_up = true)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 200);
+    assert_true(b->homed.found);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(jog, .turns = -2)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_STOPPED, 60);
+    assert_int_equal(b->faults_set, 1u << LUMI_RIG_FAULT_STRING_END);
+    assert_true(b->position > -0.8 * b->steps_per_turn);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = b->faults_set)), lumi_wire_Result_DONE);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(jog, .turns = 1)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 60);
+    bench_destroy(b);
+}
+
 static void the_hosts_emergency_stop_is_the_same(void **state)
 {
     const struct lumi_rig_safety fitted = {0};
@@ -344,6 +425,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_emergency_stop_stops_within_a_step),
         cmocka_unit_test(a_motor_goes_off_only_when_the_brake_holds),
+        cmocka_unit_test(a_platform_that_runs_away_is_too_fast),
+        cmocka_unit_test(cameras_left_recording_are_stopped_once_the_fault_is_cleared),
+        cmocka_unit_test(winding_into_the_upper_end_stops),
         cmocka_unit_test(the_hosts_emergency_stop_is_the_same),
         cmocka_unit_test(the_strings_end_ramps_down_and_only_lets_wind_up),
         cmocka_unit_test(a_slack_string_halts_and_holds),
