@@ -34,6 +34,7 @@ static void start_pll(void)
             no_crystal();
 
     RCC_APB1ENR = RCC_APB1ENR_PWREN;
+    (void)RCC_APB1ENR;
     PWR_CR = PWR_CR_VOS; /* section 5.1.3: scale 1 above 144 MHz */
 
     RCC_PLLCFGR = PLL_SETTING;
