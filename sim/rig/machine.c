@@ -239,6 +239,13 @@ void sim_machine_run(struct sim_machine *m, double seconds)
     sim_machine_run_until(m, NULL, NULL, seconds);
 }
 
+void sim_machine_release_host(struct sim_machine *m)
+{
+    m->options.host = false;
+    sim_wire_path_clear(&m->to_board);
+    sim_wire_path_clear(&m->to_host);
+}
+
 void sim_machine_put(struct sim_machine *m, const uint8_t *data, size_t size)
 {
     if (!m->unplugged)

@@ -81,6 +81,8 @@ lumi_wire_Status sim_machine_last_status(const struct sim_machine *machine); /* 
 bool sim_machine_connected(const struct sim_machine *machine);
 
 /* ---- without a host of ours: the link's bytes ---- */
+/* Our host goes away for good; whatever was under way on the link is lost. */
+void sim_machine_release_host(struct sim_machine *machine);
 void sim_machine_put(struct sim_machine *machine, const uint8_t *data, size_t size);
 size_t sim_machine_get(struct sim_machine *machine, uint8_t *data, size_t size);
 

@@ -83,6 +83,8 @@ struct sim_mechanics {
     struct sim_edge edges[SIM_EDGES]; /* in order of time */
     int edge_count;
     uint64_t bounces; /* so far */
+    double edge_below, edge_above; /* edges of the index mark around the platform's place, microsteps */
+    bool on_mark;                  /* between them */
 
     uint16_t lines;
     struct sim_camera cameras[LUMI_RIG_CAMERAS];
@@ -102,13 +104,13 @@ void sim_platform_advance(struct sim_mechanics *mechanics, uint64_t to);
 void sim_platform_powers(struct sim_mechanics *mechanics);
 double sim_platform_place(const struct sim_mechanics *mechanics); /* of the body, microsteps */
 /* When the platform's own state changes (brake), or the place must be looked at again because a switch is near. */
-uint64_t sim_platform_next(const struct sim_mechanics *mechanics);
+uint64_t sim_platform_next(struct sim_mechanics *mechanics);
 
 /* Compares the contacts with the mechanics at `now` and `before`, where the body was when last looked at. */
 void sim_switches_look(struct sim_mechanics *mechanics, double before, uint64_t since);
 void sim_switches_run(struct sim_mechanics *mechanics); /* edges that are due */
 void sim_switches_start(struct sim_mechanics *mechanics);
-double sim_switches_distance(const struct sim_mechanics *mechanics); /* microsteps to the nearest edge of the index */
+double sim_switches_distance(struct sim_mechanics *mechanics); /* microsteps to the nearest edge of the index */
 bool sim_switches_level(const struct sim_mechanics *mechanics, enum board_input input);
 
 void sim_cameras_lines(struct sim_mechanics *mechanics, uint16_t lines);

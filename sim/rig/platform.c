@@ -298,7 +298,7 @@ void sim_platform_advance(struct sim_mechanics *m, uint64_t to)
 /* Near an edge of the index the body is looked at this often: its time is interpolated in between. */
 #define LOOK_TICKS (BOARD_TICK_HZ / 20000)
 
-uint64_t sim_platform_next(const struct sim_mechanics *m)
+uint64_t sim_platform_next(struct sim_mechanics *m)
 {
     const struct sim_platform *p = &m->platform;
     uint64_t next = p->rate > 0 ? p->still_at : BOARD_NEVER;

@@ -8,25 +8,31 @@
 
 enum { CHANNEL_BOUNCE = 11 };
 
-/* Microsteps from where the index switch closes, reduced to one turn: 0 .. steps_per_turn. */
-static double from_index(const struct sim_mechanics *m, double place)
-{
-    double turn = m->platform.steps_per_turn;
-    double d = fmod(place - m->options.index_angle / (2 * LUMI_PI) * turn, turn);
-
-    return d < 0 ? d + turn : d;
-}
-
 static double index_steps(const struct sim_mechanics *m)
 {
     return m->options.index_width / (2 * LUMI_PI) * m->platform.steps_per_turn;
 }
 
-double sim_switches_distance(const struct sim_mechanics *m)
+/* The edges of the index mark on both sides of `place`, kept until it leaves them. */
+static void find_edges(struct sim_mechanics *m, double place)
 {
-    double turn = m->platform.steps_per_turn, d = from_index(m, sim_platform_place(m)), width = index_steps(m);
+    double turn = m->platform.steps_per_turn, width = index_steps(m);
+    double closes = m->options.index_angle / (2 * LUMI_PI) * turn;
 
-    return fmin(fmin(fabs(d), fabs(d - turn)), fabs(d - width));
+    if (place >= m->edge_below && place < m->edge_above)
+        return;
+    closes += floor((place - closes) / turn) * turn;
+    m->on_mark = place < closes + width;
+    m->edge_below = m->on_mark ? closes : closes + width;
+    m->edge_above = m->on_mark ? closes + width : closes + turn;
+}
+
+double sim_switches_distance(struct sim_mechanics *m)
+{
+    double place = sim_platform_place(m);
+
+    find_edges(m, place);
+    return fmin(place - m->edge_below, m->edge_above - place);
 }
 
 static bool string_contact(const struct sim_mechanics *m, enum board_input input)
@@ -50,11 +56,12 @@ static bool string_contact(const struct sim_mechanics *m, enum board_input input
     }
 }
 
-static bool contact_of(const struct sim_mechanics *m, enum board_input input)
+static bool contact_of(struct sim_mechanics *m, enum board_input input)
 {
     switch (input) {
     case BOARD_IN_INDEX:
-        return from_index(m, sim_platform_place(m)) < index_steps(m);
+        find_edges(m, sim_platform_place(m));
+        return m->on_mark;
     case BOARD_IN_SLACK:
     case BOARD_IN_STRING_END:
     case BOARD_IN_WOUND:

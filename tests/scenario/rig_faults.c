@@ -22,6 +22,8 @@ static void choose(struct rig_operator *o, int seed)
     }
     if (!f->rig.string.held)
         f->rig.control.safety.brake_fitted = brake;
+    if (seed % 10)
+        f->rig.microsteps = 4; /* a day in a quarter of the steps */
     if (seed % 7 == 0)
         for (int r = LUMI_RIG_FAULT_ESTOP + 1; r < LUMI_RIG_FAULTS; r++)
             f->rig.control.safety.reactions[r].triggers = LUMI_RIG_TRIGGERS_FINISH;

@@ -58,6 +58,7 @@ static void act(struct rig_operator *o)
     } else if (active(s.state)) {
         sim_machine_run(m, 0.5);
     } else if (s.faults) {
+        sim_machine_run(m, 0.5); /* somebody walks up and looks */
         if (sim_machine_clear(m, &error) != LUMI_OK)
             snprintf(o->refused, sizeof o->refused, "%s", error.text), sim_machine_run(m, 1);
         else if (o->clear_count < OPERATOR_CLEARS)
