@@ -4,8 +4,9 @@
 #include <math.h>
 
 #define SUPPLY_PERIOD (BOARD_TICK_HZ / 100)
-#define SUPPLY_READINGS 5      /* 50 ms below the minimum */
-#define SUPPLY_HYSTERESIS 1.03 /* cleared from so much above it */
+#define SUPPLY_READINGS 5              /* 50 ms below the minimum */
+#define LOOP_LATE (BOARD_TICK_HZ / 50) /* between two polls: the main loop hangs */
+#define SUPPLY_HYSTERESIS 1.03         /* cleared from so much above it */
 #define WATCH_PERIOD (BOARD_TICK_HZ / 200)
 #define SPEED_TOLERANCE 1.02
 
@@ -72,6 +73,12 @@ void safety_on_input(struct core *core, enum board_input input, bool active, uin
     if (input == BOARD_IN_ESTOP && active) {
         s->estop_seen = true;
         stop_now(core);
+    } else if (input == BOARD_IN_DRIVER_FAULT && active && core->has_profile && at > core->now + LOOP_LATE &&
+               core->rig.control.safety.driver_fault_fitted) {
+        /* The motor may have let go of the arm, and the main loop that would close the brake does not come round. */
+        s->driver_seen = true;
+        motion_halt(&core->motion);
+        core->board->output(core->board->port, BOARD_OUT_BRAKE, false);
     } else if (input == BOARD_IN_INDEX) {
         const int64_t position = motion_position(&core->motion);
         debounce_input(&s->index, active, position, at);
@@ -204,10 +211,12 @@ static void poll_inputs(struct core *core)
 
 static void watch_switches(struct core *core)
 {
-    const struct safety *s = &core->safety;
+    struct safety *s = &core->safety;
     const struct lumi_rig_safety *fitted = &core->rig.control.safety;
+    const bool driver = s->driver_seen;
 
-    if (s->inputs[BOARD_IN_DRIVER_FAULT] && fitted->driver_fault_fitted)
+    s->driver_seen = false;
+    if ((s->inputs[BOARD_IN_DRIVER_FAULT] && fitted->driver_fault_fitted) || driver)
         safety_raise(core, LUMI_RIG_FAULT_DRIVER, "the motor driver reports a fault");
     if (!motion_moving(&core->motion) ||
         !(s->inputs[BOARD_IN_STRING_END] || s->inputs[BOARD_IN_SLACK] || s->inputs[BOARD_IN_WOUND]))

@@ -15,6 +15,7 @@ struct core;
 
 struct safety {
     uint32_t standing;           /* bit a fault */
+    volatile bool driver_seen;   /* by the interrupt, while the main loop hung; until the fault is raised */
     volatile bool estop_seen;    /* by the interrupt, until the fault is raised */
     struct debounce index;       /* shared with the interrupt, under lock */
     struct debounce_edge marked; /* the last index mark, for the time between them; `active`: there is one */

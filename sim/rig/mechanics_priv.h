@@ -82,7 +82,7 @@ struct sim_mechanics {
     enum sim_force force[BOARD_INPUTS];
     struct sim_edge edges[SIM_EDGES]; /* in order of time */
     int edge_count;
-    uint64_t bounces; /* so far */
+    uint64_t bounces;              /* so far */
     double edge_below, edge_above; /* edges of the index mark around the platform's place, microsteps */
     bool on_mark;                  /* between them */
 

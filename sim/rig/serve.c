@@ -13,9 +13,9 @@
 #include <time.h>
 #include <unistd.h>
 
-#define IDLE_MS 5        /* between two looks at the clock */
-#define BEHIND 0.25      /* s: a computer that was busy for longer than that has stood still for the rig */
-#define ROOM 65536       /* bytes for a host that does not read; beyond it they are lost, as on a wire */
+#define IDLE_MS 5   /* between two looks at the clock */
+#define BEHIND 0.25 /* s: a computer that was busy for longer than that has stood still for the rig */
+#define ROOM 65536  /* bytes for a host that does not read; beyond it they are lost, as on a wire */
 
 struct server {
     struct sim_machine *machine;

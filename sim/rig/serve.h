@@ -10,11 +10,11 @@
 #include <signal.h>
 
 struct sim_serve_options {
-    struct sim_machine_options machine; /* host is ignored */
-    const char *link;                   /* a symbolic link to the pseudo-terminal is made there; NULL: none */
-    double speed;                       /* virtual seconds a second */
-    double seconds;                     /* virtual, until it ends by itself; 0: never */
-    bool blank;                         /* the board has no profile yet; otherwise that of the rig */
+    struct sim_machine_options machine;    /* host is ignored */
+    const char *link;                      /* a symbolic link to the pseudo-terminal is made there; NULL: none */
+    double speed;                          /* virtual seconds a second */
+    double seconds;                        /* virtual, until it ends by itself; 0: never */
+    bool blank;                            /* the board has no profile yet; otherwise that of the rig */
     const struct sim_fault_script *faults; /* from when it is served; NULL: none */
     const volatile sig_atomic_t *stop;     /* ends it when it is not 0; NULL: nothing does */
     /* Told the pseudo-terminal's path once it is there. */

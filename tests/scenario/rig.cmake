@@ -1,4 +1,10 @@
 lumi_test(rig_sweeps FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
 lumi_test(rig_video FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
+# A thousand bad days take 20 s of one core; under sanitizers the first hundred do.
 lumi_test(rig_faults FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
 target_sources(rig_faults PRIVATE rig_operator.c)
+if(LUMI_SANITIZE)
+  set_tests_properties(rig_faults PROPERTIES ENVIRONMENT LUMI_FAULTS_COUNT=100)
+endif()
+add_test(NAME rig_faults_many COMMAND rig_faults 5000 1001)
+set_tests_properties(rig_faults_many PROPERTIES LABELS "long;slow" TIMEOUT 1500)
