@@ -87,6 +87,8 @@ static int check_cameras(const struct lumi_rig *rig, struct lumi_error *error)
             RIG_REFUSE("lens %d has no usable name", i);
         if (!lumi_lens_valid(&rig->lenses[i].lens))
             RIG_REFUSE("lens '%s' is out of range", rig->lenses[i].name);
+        if (rig->lenses[i].lens.model == LUMI_LENS_EQUIRECTANGULAR)
+            RIG_REFUSE("lens '%s' is a projection, no lens", rig->lenses[i].name);
         for (int j = 0; j < i; j++)
             if (!strcmp(rig->lenses[i].name, rig->lenses[j].name))
                 RIG_REFUSE("two lenses are called '%s'", rig->lenses[i].name);

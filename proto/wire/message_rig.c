@@ -249,6 +249,7 @@ static int to_rig(lumi_wire_Profile *from, struct lumi_rig *rig, struct lumi_err
             REFUSE("lens %d is of an unknown kind, or too large", i);
     }
     rig->camera_count = (int)from->cameras_count;
+    lumi_rig_control_init(&rig->control); /* of cameras that there are not */
     for (int i = 0; i < rig->camera_count; i++) {
         copy_name(rig->cameras[i].name, from->cameras[i].name);
         if (!to_camera(&from->cameras[i], &rig->cameras[i]))

@@ -82,7 +82,23 @@ static void the_rigs_there_are_come_back_and_are_sound(void **state)
         lumi_rig_print(&rig, before, sizeof before);
         lumi_rig_print(&back, after, sizeof after);
         assert_string_equal(before, after);
+        for (int i = rig.camera_count; i < LUMI_RIG_CAMERAS; i++) /* of none: as it was before anything was said */
+            assert_int_equal(back.control.triggers[i].channel, rig.control.triggers[i].channel);
     }
+}
+
+static void a_projection_is_no_lens(void **state)
+{
+    struct lumi_error error = {0};
+    struct lumi_rig rig, back;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("bar2", &rig, NULL), LUMI_OK);
+    rig.lenses[0].lens.model = LUMI_LENS_EQUIRECTANGULAR; /* the text form has no word for it */
+    size_t size = lumi_wire_encode_profile(&rig, &scratch, data, sizeof data);
+    assert_int_equal(lumi_wire_decode_profile(data, size, &scratch, &back, NULL), LUMI_OK);
+    assert_int_equal(lumi_rig_check(&back, &error), LUMI_ERR_FORMAT);
+    assert_non_null(strstr(error.text, "projection"));
 }
 
 static void numbers_of_every_kind_come_back_bit_for_bit(void **state)
@@ -256,6 +272,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_field_of_the_profile_comes_back),
         cmocka_unit_test(the_rigs_there_are_come_back_and_are_sound),
+        cmocka_unit_test(a_projection_is_no_lens),
         cmocka_unit_test(numbers_of_every_kind_come_back_bit_for_bit),
         cmocka_unit_test(what_no_profile_can_hold_is_refused),
         cmocka_unit_test(seventeen_cameras_and_five_lenses_are_refused),
