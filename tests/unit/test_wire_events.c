@@ -286,6 +286,54 @@ static void the_numbers_of_events_wrap(void **state)
     assert_int_equal(host.events + (int)host.events_lost, 530);
 }
 
+static void events_are_lost_across_the_wrap(void **state)
+{
+    struct lumi_wire_events *events = &board.server.events;
+
+    (void)state;
+    events->first = events->next = events->cursor = UINT32_MAX - 50;
+    host.client.events_next = host.next_event = UINT32_MAX - 50;
+    a_burst_of_events(500);
+    assert_true(events->first < 500); /* the oldest is behind the wrap, the one that is wanted before it */
+    pair_run(&host, &board, 0, 100 * PAIR_MS, 1200 * PAIR_MS);
+    assert_int_equal(host.events + (int)host.events_lost, 500);
+    assert_int_equal(host.events_lost, events->lost);
+    assert_false(host.disorder);
+}
+
+static void a_host_that_moves_to_the_other_link_is_sent_at_once_what_it_lacks(void **state)
+{
+    (void)state;
+    pair_run(&host, &board, 0, 10 * PAIR_MS, 100 * PAIR_MS);
+    a_burst_of_events(5);
+    lumi_wire_server_poll(&board.server, 105 * PAIR_MS);
+    pair_lose(&board.out[0]); /* the cable was pulled */
+    lumi_wire_client_reconnected(&host.client, 110 * PAIR_MS);
+    pair_run(&host, &board, 1, 110 * PAIR_MS, 120 * PAIR_MS);
+    assert_int_equal(host.events, 5);
+}
+
+static void an_event_does_not_slip_past_an_answer_that_waits(void **state)
+{
+    lumi_wire_Event small = {.which_kind = lumi_wire_Event_state_changed_tag};
+
+    (void)state;
+    pair_run(&host, &board, 0, 10 * PAIR_MS, 100 * PAIR_MS);
+    board.out[0].size = PAIR_QUEUE - 50; /* room for the event, not for a Welcome or a Pulse */
+    lumi_wire_server_event(&board.server, &small);
+    say_hello(99, 110 * PAIR_MS);
+    lumi_wire_client_poll(&host.client, 700 * PAIR_MS);
+    lumi_wire_server_receive(&board.server, 0, host.out.data, host.out.size, 700 * PAIR_MS);
+    lumi_wire_server_poll(&board.server, 701 * PAIR_MS);
+    assert_int_equal(board.out[0].size, PAIR_QUEUE - 50);
+    assert_int_equal(lumi_wire_server_next_poll(&board.server, 701 * PAIR_MS), 701 * PAIR_MS);
+    pair_lose(&board.out[0]);
+    lumi_wire_server_poll(&board.server, 702 * PAIR_MS);
+    lumi_wire_client_receive(&host.client, board.out[0].data, board.out[0].size, 703 * PAIR_MS);
+    assert_int_equal(host.events, 1);
+    assert_int_equal(host.pulse.received_ns, 700 * PAIR_MS);
+}
+
 static void an_event_goes_out_with_the_boot_and_the_oldest_that_is_kept(void **state)
 {
     lumi_wire_BoardFrame message;
@@ -316,6 +364,9 @@ int main(void)
         OPEN(a_silent_host_is_sent_nothing_more),
         OPEN(events_of_an_earlier_boot_are_dropped),
         OPEN(the_numbers_of_events_wrap),
+        OPEN(events_are_lost_across_the_wrap),
+        OPEN(a_host_that_moves_to_the_other_link_is_sent_at_once_what_it_lacks),
+        OPEN(an_event_does_not_slip_past_an_answer_that_waits),
         OPEN(an_event_goes_out_with_the_boot_and_the_oldest_that_is_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
