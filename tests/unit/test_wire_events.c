@@ -319,13 +319,13 @@ static void an_event_does_not_slip_past_an_answer_that_waits(void **state)
 
     (void)state;
     pair_run(&host, &board, 0, 10 * PAIR_MS, 100 * PAIR_MS);
-    board.out[0].size = PAIR_QUEUE - 50; /* room for the event, not for a Welcome or a Pulse */
+    board.out[0].size = PAIR_QUEUE - 30; /* room for the event, not for a Welcome or a Pulse */
     lumi_wire_server_event(&board.server, &small);
     say_hello(99, 110 * PAIR_MS);
     lumi_wire_client_poll(&host.client, 700 * PAIR_MS);
     lumi_wire_server_receive(&board.server, 0, host.out.data, host.out.size, 700 * PAIR_MS);
     lumi_wire_server_poll(&board.server, 701 * PAIR_MS);
-    assert_int_equal(board.out[0].size, PAIR_QUEUE - 50);
+    assert_int_equal(board.out[0].size, PAIR_QUEUE - 30);
     assert_int_equal(lumi_wire_server_next_poll(&board.server, 701 * PAIR_MS), 701 * PAIR_MS);
     pair_lose(&board.out[0]);
     lumi_wire_server_poll(&board.server, 702 * PAIR_MS);
