@@ -164,6 +164,153 @@ static void the_numbers_are_those_of_the_code(void **state)
     demand("keeps four hosts");
 }
 
+/* ---- a client written from the page alone: no nanopb, none of our framing, messages by hand ---- */
+
+static size_t page_frame(const uint8_t *payload, size_t size, uint8_t *frame)
+{
+    uint8_t data[512];
+    uint32_t crc = 0xffffffff;
+    size_t at = 0, begin = 0;
+
+    memcpy(data, payload, size);
+    for (size_t i = 0; i < size; i++) {
+        crc ^= payload[i];
+        for (int bit = 0; bit < 8; bit++)
+            crc = crc & 1 ? crc >> 1 ^ 0x82f63b78 : crc >> 1; /* 1EDC6F41 with its bits turned round */
+    }
+    crc = ~crc;
+    for (int i = 0; i < 4; i++)
+        data[size++] = (uint8_t)(crc >> 8 * i);
+    data[size] = 0; /* the end counts as one */
+    frame[at++] = 0;
+    while (begin <= size) {
+        size_t length = 0;
+        while (length < 254 && data[begin + length] != 0)
+            length++;
+        frame[at++] = (uint8_t)(length + 1);
+        memcpy(frame + at, data + begin, length);
+        at += length;
+        begin += length;
+        if (length < 254 || begin == size) /* a zero that is not sent, or the end */
+            begin++;
+    }
+    frame[at++] = 0;
+    return at;
+}
+
+/* Of the first frame in `data`. */
+static size_t page_unframe(const uint8_t *data, uint8_t *payload)
+{
+    size_t size = 0, at = 0;
+
+    while (data[at] == 0)
+        at++;
+    while (data[at] != 0) {
+        unsigned code = data[at++];
+        for (unsigned i = 1; i < code; i++)
+            payload[size++] = data[at++];
+        if (code != 0xff && data[at] != 0)
+            payload[size++] = 0;
+    }
+    return size - 4;
+}
+
+static struct {
+    struct lumi_wire_server server;
+    uint8_t sent[4096];
+    size_t size;
+    double turns;
+} board;
+
+static void page_execute(void *context, const lumi_wire_Request *request, lumi_wire_Reply *reply)
+{
+    (void)context;
+    assert_int_equal(request->which_command, lumi_wire_Request_jog_tag);
+    board.turns = request->command.jog.turns;
+    reply->result = lumi_wire_Result_REFUSED;
+    strcpy(reply->text, "no");
+}
+
+static void page_status(void *context, lumi_wire_Status *status)
+{
+    (void)context;
+    (void)status;
+}
+
+static void page_nothing(void *context)
+{
+    (void)context;
+}
+
+static bool page_send(void *context, int link, const uint8_t *frame, size_t size)
+{
+    (void)context;
+    (void)link;
+    memcpy(board.sent, frame, size);
+    board.size = size;
+    return true;
+}
+
+/* Puts a payload on the line; the payload that comes back. */
+static size_t exchange(const uint8_t *payload, size_t size, uint8_t *answer)
+{
+    uint8_t frame[600];
+
+    board.size = 0;
+    lumi_wire_server_receive(&board.server, 0, frame, page_frame(payload, size, frame), 1);
+    assert_true(board.size > 0);
+    return page_unframe(board.sent, answer);
+}
+
+static void a_client_written_from_the_page_is_understood(void **state)
+{
+    static const struct lumi_wire_server_ops ops = {.execute = page_execute,
+                                                    .status = page_status,
+                                                    .emergency_stop = page_nothing,
+                                                    .heartbeat = page_nothing,
+                                                    .send = page_send};
+    const lumi_wire_Welcome identity = {.boot = 1, .board = "page"};
+    uint8_t hello[] = {0x0a, 19, 8, 1, 16, 1, 0x19, 1, 2, 3, 4, 5, 6, 7, 8, 0x25, 9, 0, 0, 0};
+    uint8_t jog[] = {0x12, 18, 0x0d, 0, 0, 0, 0, 0x10, 1, 0x2a, 9, 9, 0, 0, 0, 0, 0, 0, 0xe8, 0xbf}; /* −0.75 */
+    uint8_t answer[600];
+
+    (void)state;
+    hello[1] = sizeof hello - 2;
+    lumi_wire_server_init(&board.server, &ops, NULL, &identity);
+    size_t size = exchange(hello, sizeof hello, answer);
+    /* Welcome: version 1, the host, the token. */
+    const uint8_t begin[] = {8, 1, 0x11, 1, 2, 3, 4, 5, 6, 7, 8, 0x1d};
+    assert_true(size > 18);
+    assert_int_equal(answer[0], 0x0a);
+    assert_memory_equal(answer + 2, begin, sizeof begin);
+    memcpy(jog + 3, answer + 14, 4);
+    size = exchange(jog, sizeof jog, answer);
+    const uint8_t reply[] = {0x12, 13, 0x0d, jog[3], jog[4], jog[5], jog[6], 0x10, 1, 0x18, 1, 0x22, 2, 'n', 'o'};
+    assert_true(board.turns == -0.75);
+    assert_int_equal(size, sizeof reply);
+    assert_memory_equal(answer, reply, sizeof reply);
+}
+
+static void framing_by_the_page_is_ours_byte_for_byte(void **state)
+{
+    uint8_t payload[LUMI_WIRE_PAYLOAD_MAX], ours[LUMI_WIRE_FRAME_MAX], theirs[600], back[600];
+    uint32_t random = 1;
+
+    (void)state;
+    for (size_t size = 0; size <= LUMI_WIRE_PAYLOAD_MAX; size++)
+        for (uint32_t zeros = 0; zeros < 3; zeros++) {
+            for (size_t i = 0; i < size; i++) {
+                random = random * 1664525 + 1013904223;
+                payload[i] = zeros == 0 || random >> 24 > 10 * zeros ? (uint8_t)(random >> 16 | 1) : 0;
+            }
+            size_t length = lumi_wire_frame(payload, size, ours);
+            assert_int_equal(page_frame(payload, size, theirs), length);
+            assert_memory_equal(theirs, ours, length);
+            assert_int_equal(page_unframe(ours, back), size);
+            assert_memory_equal(back, payload, size);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -171,6 +318,8 @@ int main(void)
         cmocka_unit_test(the_tables_have_every_result_state_and_fault),
         cmocka_unit_test(the_tables_have_every_command_and_event),
         cmocka_unit_test(the_numbers_are_those_of_the_code),
+        cmocka_unit_test(framing_by_the_page_is_ours_byte_for_byte),
+        cmocka_unit_test(a_client_written_from_the_page_is_understood),
     };
     return cmocka_run_group_tests(tests, read_page, NULL);
 }
