@@ -78,6 +78,23 @@ static void write_key(struct f405 *chip, uint32_t value)
         f->cr &= ~LOCK;
 }
 
+/* A program that asks while the flash is busy will ask again and again: as much as 5 µs of that, but not beyond what
+ * else happens, is passed over at once. */
+static void poll_status(struct f405 *chip, uint32_t *value)
+{
+    struct flash *f = &chip->flash;
+    if (f->done != F405_NEVER) {
+        uint64_t to = chip->now + 5 * MICROSECOND;
+        to = to < f->done ? to : f->done;
+        to = to < chip->next ? to : chip->next;
+        if (to > chip->now)
+            chip->now = to;
+        if (chip->now >= chip->next)
+            f405_run_events(chip);
+    }
+    *value = f->sr | (f->done != F405_NEVER ? BSY : 0);
+}
+
 bool f405_flash_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
@@ -97,7 +114,7 @@ bool f405_flash_access(struct f405 *chip, int index, uint32_t offset, bool write
         if (write)
             f->sr &= ~(*value & 0xf3);
         else
-            *value = f->sr | (f->done != F405_NEVER ? BSY : 0);
+            poll_status(chip, value);
         return true;
     case 0x10:
         if (write)

@@ -11,6 +11,7 @@
 #define SYSTEM_SIZE 0x8000u
 #define UNIQUE_ID 0x7A10u       /* RM0090 39.1 */
 #define FLASH_KILOBYTES 0x7A22u /* RM0090 39.2 */
+#define RAM 0x20000000u
 #define PERIPHERALS 0x40000000u
 #define PERIPHERALS_SIZE 0x100000u
 #define AHB2 0x50000000u
@@ -103,8 +104,8 @@ bool f405_mmio(struct f405 *chip, uint32_t address, unsigned size, bool write, u
 
 static uint8_t *memory_at(struct f405 *chip, uint32_t address, unsigned size, bool write)
 {
-    if (address - 0x20000000u <= RAM_SIZE - size)
-        return chip->ram + (address - 0x20000000u);
+    if (address - RAM <= RAM_SIZE - size)
+        return chip->ram + (address - RAM);
     if (!write && address - F405_FLASH <= F405_FLASH_SIZE - size)
         return chip->flash_bytes + (address - F405_FLASH);
     return NULL;
@@ -234,11 +235,9 @@ static uint32_t count_instructions(struct f405 *chip, uint32_t address, uint32_t
     return n;
 }
 
-static bool wants_to_stop(struct f405 *chip)
+static bool wants_to_stop(const struct f405 *chip)
 {
-    if (chip->fault[0] || chip->reset_wanted || chip->stop || chip->now >= chip->until)
-        return true;
-    return f405_cpu_deliverable(chip);
+    return chip->fault[0] || chip->reset_wanted || chip->stop || chip->now >= chip->until;
 }
 
 static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *user)
@@ -267,6 +266,13 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *use
             uc_emu_stop(uc);
             return;
         }
+        /* Writing the program counter makes Unicorn leave this block before its first instruction and go on there. */
+        if (f405_cpu_deliverable(chip)) {
+            chip->attention = true;
+            chip->hook_stopped = true;
+            uc_emu_stop(uc);
+            return;
+        }
         if (chip->cpu.candidate) /* masked: look again at the next block */
             chip->attention = true;
     }
@@ -283,6 +289,8 @@ static bool on_invalid(uc_engine *uc, uc_mem_type type, uint64_t address, int si
     struct f405 *chip = user;
     if (type == UC_MEM_WRITE_PROT)
         return f405_flash_write_hook(chip, (uint32_t)address, (unsigned)size, (uint64_t)value);
+    if (type == UC_MEM_FETCH_PROT && (uint32_t)address - RAM < RAM_SIZE) /* run_core lets it and goes on */
+        return false;
     const char *doing = type == UC_MEM_WRITE_UNMAPPED                                ? "write"
                         : type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT ? "fetch"
                                                                                      : "read";
@@ -295,12 +303,17 @@ static void on_interrupt(uc_engine *uc, uint32_t number, void *user)
     struct f405 *chip = user;
     uint32_t pc = 0;
     uc_reg_read(uc, UC_ARM_REG_PC, &pc);
-    if (number == 8) /* QEMU's EXCP_EXCEPTION_EXIT */
+    if (number == 8) { /* QEMU's EXCP_EXCEPTION_EXIT */
         chip->cpu.exception_return = pc | 1;
-    else
+        f405_cpu_return(chip);
+        chip->attention = true;
+    } else {
         f405_complain(chip, "the core raised exception %u at 0x%08x", number, pc);
-    chip->hook_stopped = true;
-    uc_emu_stop(uc);
+    }
+    if (chip->fault[0]) {
+        chip->hook_stopped = true;
+        uc_emu_stop(uc);
+    }
 }
 
 /* ---- making ---- */
@@ -310,7 +323,7 @@ static bool map_memory(struct f405 *chip)
     uc_engine *uc = chip->uc;
     uc_err e = uc_mem_map_ptr(uc, F405_FLASH, F405_FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC, chip->flash_bytes);
     e = e ? e : uc_mem_map_ptr(uc, 0, F405_FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC, chip->flash_bytes);
-    e = e ? e : uc_mem_map_ptr(uc, 0x20000000, RAM_SIZE, UC_PROT_ALL, chip->ram);
+    e = e ? e : uc_mem_map_ptr(uc, RAM, RAM_SIZE, UC_PROT_READ | UC_PROT_WRITE, chip->ram);
     e = e ? e : uc_mem_map_ptr(uc, 0x10000000, CCM_SIZE, UC_PROT_READ | UC_PROT_WRITE, chip->ccm);
     e = e ? e : uc_mem_map_ptr(uc, SYSTEM_MEMORY, SYSTEM_SIZE, UC_PROT_READ | UC_PROT_EXEC, chip->system);
     e = e ? e : uc_mmio_map(uc, PERIPHERALS, PERIPHERALS_SIZE, peripheral_read, chip, peripheral_write, chip);
@@ -470,20 +483,35 @@ static void sleep_ahead(struct f405 *chip)
         chip->cpu.asleep = false;
 }
 
+/* Unicorn looks at every write to memory that may be executed, at great cost: the RAM may be only while code runs in
+ * it. */
+static void allow_ram_code(struct f405 *chip, bool allow)
+{
+    if (allow == chip->ram_code)
+        return;
+    chip->ram_code = allow;
+    if (!allow)
+        uc_ctl_remove_cache(chip->uc, (uint64_t)RAM, (uint64_t)(RAM + RAM_SIZE));
+    uc_mem_protect(chip->uc, RAM, RAM_SIZE, allow ? UC_PROT_ALL : UC_PROT_READ | UC_PROT_WRITE);
+}
+
 static void run_core(struct f405 *chip)
 {
     uint32_t pc = 0;
     uc_reg_read(chip->uc, UC_ARM_REG_PC, &pc);
+    allow_ram_code(chip, (pc & ~1u) - RAM < RAM_SIZE);
     chip->hook_stopped = false;
     chip->attention = true;
     uc_err e = uc_emu_start(chip->uc, pc | 1, 0xfffffffeu, 0, 0);
     f405_flash_fix(chip);
-    if (e != UC_ERR_OK && !chip->cpu.exception_return)
+    uc_reg_read(chip->uc, UC_ARM_REG_PC, &pc);
+    if (e == UC_ERR_FETCH_PROT && (pc & ~1u) - RAM < RAM_SIZE && !chip->ram_code)
+        return;
+    if (e != UC_ERR_OK)
         f405_complain(chip, "the core stopped: %s", uc_strerror(e));
     if (chip->hook_stopped || chip->fault[0])
         return;
     uint16_t instruction = 0;
-    uc_reg_read(chip->uc, UC_ARM_REG_PC, &pc);
     uc_mem_read(chip->uc, (pc & ~1u) - 2, &instruction, 2);
     if (instruction == 0xbf30 || instruction == 0xbf20) { /* WFI, WFE */
         chip->cpu.asleep = instruction == 0xbf30 || !chip->cpu.event;
@@ -515,8 +543,6 @@ enum f405_stop f405_run(struct f405 *chip, uint64_t until)
                 chip->now = chip->next;
             continue;
         }
-        if (chip->cpu.exception_return)
-            f405_cpu_return(chip);
         if (f405_cpu_deliverable(chip))
             f405_cpu_enter(chip);
         run_core(chip);
