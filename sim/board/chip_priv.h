@@ -136,7 +136,7 @@ struct f405 {
     uc_hook hooks[4];
     uint64_t now, until, next; /* next: the earliest event of anything */
     uint64_t instructions;
-    bool on, stop, reset_wanted, attention, hook_stopped, ram_code;
+    bool on, stop, reset_wanted, attention, hook_stopped;
     uint32_t reset_flags; /* RCC_CSR bits of the reset that is wanted */
     uint32_t resets, block_address, previous_block;
     enum f405_stop reason;

@@ -289,8 +289,6 @@ static bool on_invalid(uc_engine *uc, uc_mem_type type, uint64_t address, int si
     struct f405 *chip = user;
     if (type == UC_MEM_WRITE_PROT)
         return f405_flash_write_hook(chip, (uint32_t)address, (unsigned)size, (uint64_t)value);
-    if (type == UC_MEM_FETCH_PROT && (uint32_t)address - RAM < RAM_SIZE) /* run_core lets it and goes on */
-        return false;
     const char *doing = type == UC_MEM_WRITE_UNMAPPED                                ? "write"
                         : type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT ? "fetch"
                                                                                      : "read";
@@ -323,7 +321,7 @@ static bool map_memory(struct f405 *chip)
     uc_engine *uc = chip->uc;
     uc_err e = uc_mem_map_ptr(uc, F405_FLASH, F405_FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC, chip->flash_bytes);
     e = e ? e : uc_mem_map_ptr(uc, 0, F405_FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC, chip->flash_bytes);
-    e = e ? e : uc_mem_map_ptr(uc, RAM, RAM_SIZE, UC_PROT_READ | UC_PROT_WRITE, chip->ram);
+    e = e ? e : uc_mem_map_ptr(uc, RAM, RAM_SIZE, UC_PROT_ALL, chip->ram);
     e = e ? e : uc_mem_map_ptr(uc, 0x10000000, CCM_SIZE, UC_PROT_READ | UC_PROT_WRITE, chip->ccm);
     e = e ? e : uc_mem_map_ptr(uc, SYSTEM_MEMORY, SYSTEM_SIZE, UC_PROT_READ | UC_PROT_EXEC, chip->system);
     e = e ? e : uc_mmio_map(uc, PERIPHERALS, PERIPHERALS_SIZE, peripheral_read, chip, peripheral_write, chip);
@@ -483,30 +481,15 @@ static void sleep_ahead(struct f405 *chip)
         chip->cpu.asleep = false;
 }
 
-/* Unicorn looks at every write to memory that may be executed, at great cost: the RAM may be only while code runs in
- * it. */
-static void allow_ram_code(struct f405 *chip, bool allow)
-{
-    if (allow == chip->ram_code)
-        return;
-    chip->ram_code = allow;
-    if (!allow)
-        uc_ctl_remove_cache(chip->uc, (uint64_t)RAM, (uint64_t)(RAM + RAM_SIZE));
-    uc_mem_protect(chip->uc, RAM, RAM_SIZE, allow ? UC_PROT_ALL : UC_PROT_READ | UC_PROT_WRITE);
-}
-
 static void run_core(struct f405 *chip)
 {
     uint32_t pc = 0;
     uc_reg_read(chip->uc, UC_ARM_REG_PC, &pc);
-    allow_ram_code(chip, (pc & ~1u) - RAM < RAM_SIZE);
     chip->hook_stopped = false;
     chip->attention = true;
     uc_err e = uc_emu_start(chip->uc, pc | 1, 0xfffffffeu, 0, 0);
     f405_flash_fix(chip);
     uc_reg_read(chip->uc, UC_ARM_REG_PC, &pc);
-    if (e == UC_ERR_FETCH_PROT && (pc & ~1u) - RAM < RAM_SIZE && !chip->ram_code)
-        return;
     if (e != UC_ERR_OK)
         f405_complain(chip, "the core stopped: %s", uc_strerror(e));
     if (chip->hook_stopped || chip->fault[0])
