@@ -213,10 +213,13 @@ int board_client_open(struct board_client *c, double seconds, struct lumi_error 
 int board_client_request(struct board_client *c, lumi_wire_Request *request, lumi_wire_Reply *answer,
                          struct lumi_error *error)
 {
+    uint64_t end = after(c, PATIENCE);
     LUMI_TRY(board_client_open(c, PATIENCE, error));
+    while (c->wire.in_flight && f405_machine_now(c->machine) < end) /* one that was given up, until it is known lost */
+        LUMI_TRY(step(c, end, error));
     c->replied = c->lost = false;
     LUMI_TRY(lumi_wire_client_request(&c->wire, request, now_ns(c), error));
-    uint64_t end = after(c, PATIENCE);
+    end = after(c, PATIENCE);
     while (!c->replied && !c->lost && f405_machine_now(c->machine) < end)
         LUMI_TRY(step(c, end, error));
     if (!c->replied)

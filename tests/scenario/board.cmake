@@ -1,0 +1,10 @@
+# The flashed bytes on the emulated board; where Unicorn or the cross compiler is missing, they are skipped.
+if(TARGET lumi_sim_board)
+  foreach(name board_sweep)
+    lumi_test(${name} FOLDERS sim_board sim_rig firmware_host firmware_core wire mechanism base LABELS slow)
+    target_compile_definitions(${name} PRIVATE LUMI_FIRMWARE="${LUMI_FIRMWARE}")
+  endforeach()
+else()
+  add_test(NAME board_sweep COMMAND sh -c "echo 'skipped: libunicorn-dev is missing'; exit 77")
+  set_tests_properties(board_sweep PROPERTIES SKIP_RETURN_CODE 77)
+endif()
