@@ -9,7 +9,8 @@
 
 struct board_client;
 
-/* `link`: enumerates the device first where it is USB. NULL: no memory, or no device. The machine stays the caller's. */
+/* `link`: enumerates the device first where it is USB. NULL: no memory, or no device. The machine stays the caller's.
+ */
 struct board_client *board_client_create(struct f405_machine *machine, enum board_link link);
 void board_client_destroy(struct board_client *client);
 /* What of the client library is to be seen: session, counters. */

@@ -21,8 +21,14 @@ static uint32_t sector_size(int sector)
 
 void f405_flash_reset(struct f405 *chip)
 {
-    uint32_t acr = chip->flash.acr;
-    chip->flash = (struct flash){.cr = LOCK, .optcr = 0x0FFFAAED, .done = F405_NEVER, .sector = -1, .acr = acr};
+    struct flash *f = &chip->flash;
+    *f = (struct flash){.cr = LOCK,
+                        .optcr = 0x0FFFAAED,
+                        .done = F405_NEVER,
+                        .cut_at = F405_NEVER,
+                        .sector = -1,
+                        .acr = f->acr,
+                        .cut_operation = f->cut_operation};
 }
 
 static void error(struct f405 *chip, uint32_t flag)
@@ -39,6 +45,20 @@ static uint64_t erase_time(const struct f405 *chip, int sector)
     return (uint64_t)ms[sector < 4 ? 0 : sector == 4 ? 1 : 2][parallel > 2 ? 2 : parallel] * 1000 * MICROSECOND;
 }
 
+/* The flash is busy so long from now. */
+static void begin(struct f405 *chip, uint64_t cycles)
+{
+    struct flash *f = &chip->flash;
+    f->done = chip->now + cycles;
+    if (f->cut_operation && --f->cut_operation == 0)
+        f->cut_at = chip->now + cycles / 2;
+}
+
+void f405_cut_in_flash(struct f405 *chip, unsigned operation)
+{
+    chip->flash.cut_operation = operation;
+}
+
 static void start(struct f405 *chip)
 {
     struct flash *f = &chip->flash;
@@ -48,7 +68,7 @@ static void start(struct f405 *chip)
         return;
     }
     f->sector = sector;
-    f->done = chip->now + erase_time(chip, sector);
+    begin(chip, erase_time(chip, sector));
 }
 
 static void write_cr(struct f405 *chip, uint32_t value)
@@ -146,6 +166,8 @@ bool f405_flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, u
     if (f->done != F405_NEVER) { /* 3.5: the bus waits */
         chip->now = f->done;
         f405_run_events(chip);
+        if (chip->off_wanted)
+            return true;
     }
     if (f->cr & LOCK || !(f->cr & PG)) {
         error(chip, PGSERR);
@@ -160,13 +182,13 @@ bool f405_flash_write_hook(struct f405 *chip, uint32_t address, unsigned size, u
         error(chip, PGAERR);
         return true;
     }
+    memcpy(f->before, at, size);
     for (unsigned i = 0; i < size; i++)
         f->fix[i] &= (uint8_t)(value >> 8 * i);
     f->address = address;
     f->size = size;
     f->sector = -1;
-    memcpy(&f->value, f->fix, size);
-    f->done = chip->now + 16 * MICROSECOND; /* DS8626 table 40 */
+    begin(chip, 16 * MICROSECOND); /* DS8626 table 40 */
     f405_schedule(chip);
     return true;
 }
@@ -183,6 +205,11 @@ void f405_flash_fix(struct f405 *chip)
 void f405_flash_event(struct f405 *chip)
 {
     struct flash *f = &chip->flash;
+    if (f->cut_at <= chip->now) {
+        f->cut_at = F405_NEVER;
+        chip->off_wanted = chip->attention = true;
+        return;
+    }
     f->done = F405_NEVER;
     if (f->sector >= 0)
         memset(chip->flash_bytes + sector_start(f->sector), 0xff, sector_size(f->sector));
@@ -195,7 +222,7 @@ void f405_flash_event(struct f405 *chip)
     }
 }
 
-/* What an operation leaves when the power goes: bits that were on their way are either. */
+/* What an operation leaves when the power goes: bits that were on their way are either, others as they were. */
 void f405_flash_power_cut(struct f405 *chip)
 {
     struct flash *f = &chip->flash;
@@ -206,10 +233,10 @@ void f405_flash_power_cut(struct f405 *chip)
     if (f->sector >= 0) {
         uint8_t *bytes = chip->flash_bytes + sector_start(f->sector);
         for (uint32_t i = 0; i < sector_size(f->sector); i++)
-            bytes[i] |= (uint8_t)(f405_random(chip) & f405_random(chip));
+            bytes[i] |= (uint8_t)(f405_random(chip) & f405_random(chip)); /* towards 0xff */
     } else if (f->size) {
         uint8_t *bytes = chip->flash_bytes + (f->address - F405_FLASH);
         for (unsigned i = 0; i < f->size; i++)
-            bytes[i] |= (uint8_t)f405_random(chip);
+            bytes[i] |= f->before[i] & (uint8_t)f405_random(chip);
     }
 }

@@ -41,10 +41,12 @@ struct flash {
     uint32_t acr, sr, cr, optcr;
     int unlock; /* keys given */
     bool locked_out;
-    uint64_t done;          /* F405_NEVER: idle */
+    uint64_t done; /* F405_NEVER: idle */
+    uint64_t cut_at;
+    unsigned cut_operation;
     int sector;             /* being erased, or −1 */
     uint32_t address, size; /* being programmed */
-    uint64_t value;
+    uint8_t before[8];      /* what stood there */
     /* A write that Unicorn will carry out behind the model's back; put right at the next look. */
     uint32_t fix_address, fix_size;
     uint8_t fix[8];
@@ -136,7 +138,7 @@ struct f405 {
     uc_hook hooks[4];
     uint64_t now, until, next; /* next: the earliest event of anything */
     uint64_t instructions;
-    bool on, stop, reset_wanted, attention, hook_stopped;
+    bool on, stop, reset_wanted, off_wanted, attention, hook_stopped;
     uint32_t reset_flags; /* RCC_CSR bits of the reset that is wanted */
     uint32_t resets, block_address, previous_block;
     enum f405_stop reason;

@@ -169,7 +169,7 @@ static uint64_t earlier(uint64_t a, uint64_t b)
 void f405_schedule(struct f405 *chip)
 {
     uint64_t next = earlier(f405_cpu_next(chip), f405_iwdg_next(chip));
-    next = earlier(next, chip->flash.done);
+    next = earlier(next, earlier(chip->flash.done, chip->flash.cut_at));
     next = earlier(next, chip->adc.done);
     next = earlier(next, chip->otg.reset_end);
     for (int i = 1; i < TIMERS; i++)
@@ -196,7 +196,7 @@ void f405_run_events(struct f405 *chip)
         for (int i = 1; i < F405_USARTS; i++)
             if (f405_usart_next(chip, i) <= at)
                 f405_usart_event(chip, i);
-        if (chip->flash.done <= at)
+        if (chip->flash.done <= at || chip->flash.cut_at <= at)
             f405_flash_event(chip);
         if (chip->adc.done <= at)
             f405_adc_event(chip);
@@ -237,7 +237,7 @@ static uint32_t count_instructions(struct f405 *chip, uint32_t address, uint32_t
 
 static bool wants_to_stop(const struct f405 *chip)
 {
-    return chip->fault[0] || chip->reset_wanted || chip->stop || chip->now >= chip->until;
+    return chip->fault[0] || chip->reset_wanted || chip->off_wanted || chip->stop || chip->now >= chip->until;
 }
 
 static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *user)
@@ -250,7 +250,7 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *use
         f405_flash_fix(chip);
     /* RM0090 3.5.2: a read of flash (so also the next instruction from it) waits for the end of the operation. */
     if (chip->flash.done != F405_NEVER && address - F405_FLASH < F405_FLASH_SIZE && chip->now < chip->flash.done)
-        chip->now = chip->flash.done;
+        chip->now = earlier(chip->flash.done, chip->flash.cut_at);
     if (chip->now >= chip->next)
         f405_run_events(chip);
     if (address - SYSTEM_MEMORY < SYSTEM_SIZE) {
@@ -355,7 +355,7 @@ struct f405 *f405_create(const struct f405_ops *ops, void *context)
     chip->context = context;
     chip->random = 88172645463325252u;
     chip->next = chip->until = F405_NEVER;
-    chip->flash.done = chip->adc.done = chip->otg.reset_end = F405_NEVER;
+    chip->flash.cut_at = chip->flash.done = chip->adc.done = chip->otg.reset_end = F405_NEVER;
     for (int i = 0; i < F405_PINS; i++)
         chip->pin[i] = (struct pin){.output = F405_FLOATING, .driven = F405_FLOATING};
     chip->blocks = lumi_calloc(BLOCKS, sizeof *chip->blocks);
@@ -450,7 +450,9 @@ void f405_power(struct f405 *chip, bool on)
     if (on == chip->on)
         return;
     chip->on = on;
+    chip->off_wanted = false;
     if (!on) {
+        chip->reset_wanted = false;
         f405_flash_power_cut(chip);
         memset(chip->timer, 0, sizeof chip->timer);
         f405_gpio_reset(chip);
@@ -515,6 +517,8 @@ enum f405_stop f405_run(struct f405 *chip, uint64_t until)
     while (!chip->fault[0] && !chip->stop) {
         if (chip->now >= chip->next)
             f405_run_events(chip);
+        if (chip->off_wanted)
+            f405_power(chip, false);
         if (chip->reset_wanted)
             reset(chip, chip->reset_flags);
         if (chip->now >= until || chip->fault[0] || chip->stop)
@@ -564,6 +568,11 @@ uint32_t f405_pc(const struct f405 *chip)
 uint32_t f405_resets(const struct f405 *chip)
 {
     return chip->resets;
+}
+
+bool f405_is_on(const struct f405 *chip)
+{
+    return chip->on;
 }
 
 bool f405_flash_busy(const struct f405 *chip)

@@ -76,6 +76,9 @@ uint64_t f405_instructions(const struct f405 *chip);
 uint32_t f405_pc(const struct f405 *chip);
 uint32_t f405_resets(const struct f405 *chip); /* since creation, power-on included */
 bool f405_flash_busy(const struct f405 *chip); /* an erase or a write is going on */
+/* The power goes in the middle of the n-th erase or write of the flash from now; 0: not. */
+void f405_cut_in_flash(struct f405 *chip, unsigned operation);
+bool f405_is_on(const struct f405 *chip);
 const struct f405_exception_stats *f405_stats(const struct f405 *chip, int exception);
 void f405_clear_stats(struct f405 *chip);
 

@@ -19,8 +19,6 @@ struct f405_machine {
     uint16_t lines;
     uint64_t mechanics_next; /* as it was when nothing had happened to them since; 0: to be asked */
     uint64_t cut_at;
-    unsigned cut_operation; /* flash operations until the power goes; 0: never */
-    bool flash_was_busy;
 };
 
 /* ---- from the chip ---- */
@@ -215,27 +213,10 @@ uint64_t f405_machine_now(const struct f405_machine *m)
     return f405_now(m->chip);
 }
 
-/* In steps short enough to see every operation of the flash (16 µs) while one of them is to be cut. */
-static enum f405_stop watch_flash(struct f405_machine *m, uint64_t cycle)
-{
-    enum f405_stop stop = F405_STOP_TIME;
-    while (stop == F405_STOP_TIME && m->cut_operation && f405_now(m->chip) < cycle) {
-        uint64_t next = f405_now(m->chip) + F405_HZ / 400000;
-        stop = f405_run(m->chip, next < cycle ? next : cycle);
-        bool busy = f405_flash_busy(m->chip);
-        if (busy && !m->flash_was_busy && --m->cut_operation == 0)
-            f405_machine_power(m, false);
-        m->flash_was_busy = busy;
-    }
-    return stop;
-}
-
 enum f405_stop f405_machine_run_to(struct f405_machine *m, uint64_t cycle)
 {
     enum f405_stop stop = F405_STOP_TIME;
     m->mechanics_next = 0; /* the caller may have done something to them */
-    if (m->cut_operation)
-        stop = watch_flash(m, cycle);
     while (stop == F405_STOP_TIME && f405_now(m->chip) < cycle) {
         stop = f405_run(m->chip, cycle);
         if (m->cut_at <= f405_now(m->chip)) {
@@ -265,8 +246,7 @@ void f405_machine_power_cut_at(struct f405_machine *m, uint64_t at)
 
 void f405_machine_power_cut_in_flash(struct f405_machine *m, unsigned operation)
 {
-    m->cut_operation = operation;
-    m->flash_was_busy = f405_flash_busy(m->chip);
+    f405_cut_in_flash(m->chip, operation);
 }
 
 size_t f405_machine_serial_read(struct f405_machine *m, uint8_t *data, size_t size)
