@@ -102,8 +102,11 @@ static void launch(uint64_t at)
 void steps_start(uint64_t at, bool forward, uint32_t first)
 {
     const uint32_t lock = basepri_raise(PRIORITY_CORE);
-    const uint64_t earliest = time_now() + START_MIN;
 
+    /* The pulse before may not have fallen yet. */
+    while ((TIM_CR1(TIM) & TIM_CR1_CEN) && steps.pulsing && TIM_CNT(TIM) < steps.width)
+        ;
+    const uint64_t earliest = time_now() + START_MIN;
     GPIO_BSRR(GPIOA_BASE) = forward ? 1u << PIN_A_DIR : 1u << (PIN_A_DIR + 16);
     TIM_CR1(TIM) = HALTED;
     TIM_CCR(TIM, 1) = 0;

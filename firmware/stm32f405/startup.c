@@ -50,6 +50,10 @@ void Reset_Handler(void)
         loader_enter();
     }
     loader_magic[0] = 0;
+    /* After a reset the clock is HSI (RM0090 section 7.2.6). Another one is a loader's that has jumped here and may
+     * have left more than that behind. */
+    if (RCC_CFGR & RCC_CFGR_SWS)
+        system_restart();
     starts = starts + 1;
     SCB_VTOR = FLASH_IMAGE_ADDRESS;
 
