@@ -138,6 +138,8 @@ void sim_platform_step(struct sim_mechanics *m, bool forward)
         p->slip = p->slip > 4 ? p->slip - 4 : 0;
         p->missed += 4;
         p->field -= (forward ? 4 : -4) * full_step(m);
+        p->seat -= (forward ? 4 : -4) * full_step(m);
+        pay_out(m, p->seat);
     }
     if (!forward && !m->truth.string.held && p->field < top - p->lag_limit) {
         /* The arm lies on its rest and the string is tight: the rotor jumps back into the place it came from. */
