@@ -87,7 +87,8 @@ static void an_emergency_stop_ends_the_steps_and_is_released_only_by_a_clear(voi
     assert_int_equal(after, 0);
     assert_int_equal(sim_machine_clear(f.machine, &expected_error), LUMI_ERR_BUSY); /* still pressed */
     sim_machine_run(f.machine, 5);
-    assert_int_equal(sim_machine_start(f.machine, 0, true, &expected_error), LUMI_ERR_BUSY); /* let go, but not cleared */
+    assert_int_equal(sim_machine_start(f.machine, 0, true, &expected_error),
+                     LUMI_ERR_BUSY); /* let go, but not cleared */
     clear_and_home(&f);
     finish(&f);
     rig_fixture_finish(&f);
@@ -213,7 +214,7 @@ static void power_that_goes_while_a_profile_is_written_leaves_the_old_or_the_new
 
     (void)state;
     for (uint64_t bytes = 0; bytes < 24000; bytes += 613) {
-            rig_fixture_init(&f, "arc16");
+        rig_fixture_init(&f, "arc16");
         f.machine = sim_machine_create(&f.rig, &f.options);
         OK(sim_machine_configure(f.machine, &f.rig, error));
         uint32_t first = status_of(&f).profile_crc;
