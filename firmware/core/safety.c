@@ -254,7 +254,7 @@ static void tell_verdict(struct core *core, enum index_verdict verdict)
         safety_raise(core, LUMI_RIG_FAULT_INDEX_EARLY, "the index mark came where it should not");
 }
 
-/* The platform's own speed, by the time between two marks that are a turn apart by the steps: a sweep that winds back a
+/* The platform's own speed, by the time between two marks that lie apart by the steps: a sweep that winds back a
  * little passes the same mark again. Homing counts steps from elsewhere, so it leaves no mark behind. */
 static void watch_turn(struct core *core, const struct debounce_edge *edge)
 {
@@ -262,7 +262,7 @@ static void watch_turn(struct core *core, const struct debounce_edge *edge)
     const double limit = core->rig.control.safety.overspeed;
     const double apart = fabs((double)(edge->position - s->marked.position));
 
-    if (s->marked.active && apart > core->steps_per_turn / 2 && limit > 0 &&
+    if (s->marked.active && apart > core->steps_per_turn / 4 && limit > 0 &&
         (double)(edge->at - s->marked.at) * limit < 2 * LUMI_PI * BOARD_TICK_HZ)
         safety_raise(core, LUMI_RIG_FAULT_OVERSPEED, "a turn took less time than it may");
     s->marked = *edge;

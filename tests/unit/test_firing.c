@@ -201,27 +201,32 @@ static void lines_of_two_shots_overlap(void **state)
 
     (void)state;
     begin(&p, 2);
-    /* Camera 1's focus is held over three shots that come faster than its lead. */
+    /* Camera 1's lines for a shot are up while camera 0's for the shot before are. */
+    p.rig.control.triggers[1].shutter_lag = 0.3;
     p.rig.control.triggers[1].focus_channel = 15;
     p.rig.control.triggers[1].focus_lead = 0.25;
     firing_begin(&p.firing, &p.rig, &p.plan);
-    uint64_t middle = p.now + 300 * MS;
+    uint64_t middle = p.now + 600 * MS, rises[3][3] = {{0}};
     for (uint32_t i = 0; i < 3; i++)
-        assert_true(firing_shoot(&p.firing, i, 0, middle + i * 100 * MS, 0));
-    run(&p, middle + 500 * MS);
-    int risen = 0;
-    for (int i = 0, before = 0; i < p.out_count; i++) {
-        bool held = p.out[i].at < middle - 5 * MS + 220 * MS;
-        assert_int_equal(p.out[i].lines >> 15, held);
-        risen += (p.out[i].lines & 3) == 3 && (before & 3) == 0;
-        before = p.out[i].lines;
+        assert_true(firing_shoot(&p.firing, i, 0, middle + i * 300 * MS, 0));
+    run(&p, middle + 900 * MS);
+    const int lines[] = {0, 1, 15};
+    for (int k = 0; k < 3; k++) {
+        int risen = 0;
+        for (int i = 0, before = 0; i < p.out_count; before = p.out[i++].lines)
+            if (p.out[i].lines >> lines[k] & 1 && !(before >> lines[k] & 1))
+                rises[k][risen++] = p.out[i].at;
+        assert_int_equal(risen, 3);
     }
-    assert_int_equal(risen, 3);
-    assert_int_equal(p.record_count, 3);
-    for (int i = 0; i < 3; i++) {
+    for (uint64_t i = 0; i < 3; i++) {
+        uint64_t begun = middle - 5 * MS + i * 300 * MS;
+        assert_int_equal(rises[0][i], begun);
+        assert_int_equal(rises[1][i], begun - 300 * MS);
+        assert_int_equal(rises[2][i], begun - 550 * MS);
         assert_int_equal(p.records[i].number, i);
         assert_int_equal(p.records[i].state, SHOT_FIRED);
     }
+    assert_int_equal(p.record_count, 3);
     assert_int_equal(p.lines, 0);
 }
 
