@@ -208,8 +208,8 @@ static void lines_of_two_shots_overlap(void **state)
     firing_begin(&p.firing, &p.rig, &p.plan);
     uint64_t middle = p.now + 600 * MS, rises[3][3] = {{0}};
     for (uint32_t i = 0; i < 3; i++)
-        assert_true(firing_shoot(&p.firing, i, 0, middle + i * 300 * MS, 0));
-    run(&p, middle + 900 * MS);
+        assert_true(firing_shoot(&p.firing, i, 0, middle + i * 400 * MS, 0));
+    run(&p, middle + 1200 * MS);
     const int lines[] = {0, 1, 15};
     for (int k = 0; k < 3; k++) {
         int risen = 0;
@@ -219,7 +219,7 @@ static void lines_of_two_shots_overlap(void **state)
         assert_int_equal(risen, 3);
     }
     for (uint64_t i = 0; i < 3; i++) {
-        uint64_t begun = middle - 5 * MS + i * 300 * MS;
+        uint64_t begun = middle - 5 * MS + i * 400 * MS;
         assert_int_equal(rises[0][i], begun);
         assert_int_equal(rises[1][i], begun - 300 * MS);
         assert_int_equal(rises[2][i], begun - 550 * MS);
