@@ -206,6 +206,56 @@ static void a_board_that_hangs_is_started_anew_and_only_homes(void **state)
     rig_fixture_finish(&f);
 }
 
+static bool fired_some(struct sim_machine *m, void *context)
+{
+    return sim_machine_last_status(m).shots_fired >= *(const uint32_t *)context;
+}
+
+static void a_paused_sweep_goes_on_where_it_was(void **state)
+{
+    struct rig_fixture f;
+    uint32_t some = 50;
+
+    (void)state;
+    begin(&f, "bar2", 30);
+    OK(sim_machine_start(f.machine, 0, false, error));
+    assert_true(sim_machine_run_until(f.machine, fired_some, &some, 200));
+    OK(sim_machine_pause(f.machine, error));
+    OK(sim_machine_wait_sweep(f.machine, 100, error));
+    lumi_wire_Status status = status_of(&f);
+    assert_int_equal(status.state, lumi_wire_State_PAUSED);
+    assert_true(status.position_known && status.next_shot >= 50 && status.next_shot < 60);
+    sim_machine_run(f.machine, 120);
+    finish(&f);
+    struct rig_figures figures = judge_exposures(&f);
+    assert_int_equal(figures.exposures, 2592);
+    assert_true(figures.angle_worst < 0.01);
+    judge_events(&f);
+    rig_fixture_finish(&f);
+}
+
+static void whoever_reaches_the_board_can_stop_it(void **state)
+{
+    struct rig_fixture f;
+    uint32_t some = 5;
+    int before, after;
+
+    (void)state;
+    begin(&f, "arc16", 30);
+    OK(sim_machine_start(f.machine, 0, false, error));
+    assert_true(sim_machine_run_until(f.machine, fired_some, &some, 200));
+    sim_machine_emergency_stop(f.machine);
+    sim_machine_run(f.machine, 0.1);
+    sim_machine_step_ticks(f.machine, &before);
+    sim_machine_run(f.machine, 10);
+    sim_machine_step_ticks(f.machine, &after);
+    assert_int_equal(before, after);
+    expect_fault(&f, LUMI_RIG_FAULT_ESTOP);
+    clear_and_home(&f);
+    finish(&f);
+    rig_fixture_finish(&f);
+}
+
 /* The power goes after every so many bytes of a new profile: the board has the old one or the new one, never none. */
 static void power_that_goes_while_a_profile_is_written_leaves_the_old_or_the_new(void **state)
 {
@@ -252,6 +302,8 @@ int main(void)
         cmocka_unit_test(lost_steps_are_found_at_the_next_mark),
         cmocka_unit_test(a_string_that_is_out_or_loose_stops_the_sweep),
         cmocka_unit_test(a_board_that_hangs_is_started_anew_and_only_homes),
+        cmocka_unit_test(a_paused_sweep_goes_on_where_it_was),
+        cmocka_unit_test(whoever_reaches_the_board_can_stop_it),
         cmocka_unit_test(power_that_goes_while_a_profile_is_written_leaves_the_old_or_the_new),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
