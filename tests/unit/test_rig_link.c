@@ -234,6 +234,20 @@ static void a_line_that_another_program_holds_is_refused(void **state)
     fake_board_stop(&board);
 }
 
+static void a_line_without_rs485_says_so(void **state)
+{
+    struct lumi_error error = {0};
+
+    (void)state;
+    start("pty");
+    strcat(board.address, ",rs485");
+    struct lumi_rig_link *link = open_link(2);
+    assert_int_equal(lumi_rig_link_wait(link, 20, true, &error), LUMI_ERR_IO);
+    assert_non_null(strstr(error.text, "has no RS-485"));
+    lumi_rig_link_close(link);
+    fake_board_stop(&board);
+}
+
 static void a_device_that_is_not_ours_is_refused(void **state)
 {
     struct lumi_error error = {0};
@@ -442,6 +456,7 @@ int main(void)
         cmocka_unit_test(a_request_that_a_restart_swallowed_is_reported_lost),
         cmocka_unit_test(a_silent_board_ends_a_wait_and_what_comes_after_still_works),
         cmocka_unit_test(a_line_that_another_program_holds_is_refused),
+        cmocka_unit_test(a_line_without_rs485_says_so),
         cmocka_unit_test(a_device_that_is_not_ours_is_refused),
         cmocka_unit_test(nobody_at_the_other_end_is_said),
         cmocka_unit_test(a_board_of_another_version_is_refused_with_both_ranges),
