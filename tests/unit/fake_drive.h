@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define FAKE_DRIVE_MAP                                                                                                 \
-    "[drive]\nname = fake\nunit = 3\ntimeout_s = 0.05\nretries = 2\nmove_timeout_s = 1.5\nhome_timeout_s = 1.5\n"      \
+    "[drive]\nname = fake\nunit = 3\ntimeout_s = 0.3\nretries = 2\nmove_timeout_s = 1.5\nhome_timeout_s = 1.5\n"       \
     "[scale]\ncounts_per_turn = -36000\nzero_counts = 500\ntolerance_counts = 2\n"                                     \
     "[status]\naddress = 0\nready = 0\nenabled = 1\nreached = !2\nfault = 3\nhomed = 4\n"                              \
     "[fault-code]\naddress = 1\n[position]\naddress = 2\nwidth = 32\n"                                                 \

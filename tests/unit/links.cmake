@@ -5,6 +5,8 @@ target_link_libraries(lumi_fake_drive PUBLIC PkgConfig::libmodbus lumi_flags Pkg
 lumi_test(test_clock_match FOLDERS daemon_rig)
 lumi_test(test_rig_link FOLDERS daemon_rig fake_board LABELS threads)
 lumi_test(test_rig_drive FOLDERS daemon_rig fake_board fake_drive)
+lumi_test(test_rig_flash FOLDERS daemon_rig fake_board)
+lumi_test(test_sweep_log FOLDERS daemon_rig)
 
 # libusb on a kernel that is umockdev's; without it this test is left out.
 pkg_check_modules(UMOCKDEV IMPORTED_TARGET umockdev-1.0)
