@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_core FOLDERS firmware_host)
