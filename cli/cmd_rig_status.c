@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <json-glib/json-glib.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 static char *address;
 static gboolean json;
@@ -131,8 +132,9 @@ static void print_text(const struct lumi_rig_link_snapshot *link, const lumi_wir
         printf("sweep     %u fired, %u lost, next is shot %u\n", (unsigned)status->shots_fired,
                (unsigned)status->shots_lost, (unsigned)status->next_shot);
     if (link->clock_matched)
-        printf("clock     %.6f s ahead of the host's, round trip %.2f ms\n", (double)link->clock_offset_ns * 1e-9,
-               link->round_trip_ns * 1e-6);
+        printf("clock     %.6f s %s the host's, round trip %.2f ms\n",
+               (double)llabs((long long)link->clock_offset_ns) * 1e-9,
+               link->clock_offset_ns < 0 ? "behind" : "ahead of", link->round_trip_ns * 1e-6);
 }
 
 static int run(int argc, char **argv, struct lumi_error *error)

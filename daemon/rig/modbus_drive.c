@@ -15,12 +15,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 
 struct lumi_rig_drive {
     struct lumi_drive_map map;
     modbus_t *bus;
     char *name;
-    bool connected;
+    bool serial, connected;
 };
 
 /* ---- one exchange ---- */
@@ -54,18 +55,24 @@ static bool connection_broken(int number)
            number == ENOTCONN;
 }
 
-static bool connect_bus(struct lumi_rig_drive *drive)
-{
-    if (!drive->connected)
-        drive->connected = modbus_connect(drive->bus) == 0;
-    return drive->connected;
-}
-
 static void disconnect_bus(struct lumi_rig_drive *drive)
 {
     if (drive->connected)
         modbus_close(drive->bus);
     drive->connected = false;
+}
+
+/* A line that another program has locked (the board's own, say) is not spoken on. */
+static bool connect_bus(struct lumi_rig_drive *drive)
+{
+    if (drive->connected)
+        return true;
+    drive->connected = modbus_connect(drive->bus) == 0;
+    if (drive->connected && drive->serial && flock(modbus_get_socket(drive->bus), LOCK_EX | LOCK_NB)) {
+        disconnect_bus(drive);
+        errno = EBUSY;
+    }
+    return drive->connected;
 }
 
 static int try_exchange(struct lumi_rig_drive *drive, enum direction direction, const struct lumi_drive_register *reg,
@@ -279,7 +286,9 @@ static int set_up(struct lumi_rig_drive *drive, struct lumi_error *error)
     modbus_set_error_recovery(drive->bus, MODBUS_ERROR_RECOVERY_NONE);
     if (modbus_set_slave(drive->bus, drive->map.unit) || modbus_set_response_timeout(drive->bus, seconds, microseconds))
         return lumi_fail(error, LUMI_ERR_ARG, "%s: %s", drive->name, modbus_strerror(errno));
-    if (!connect_bus(drive))
+    if (!connect_bus(drive) && errno == EBUSY)
+        return lumi_fail(error, LUMI_ERR_BUSY, "%s: another program has it locked", drive->name);
+    if (!drive->connected)
         return lumi_fail(error, errno == ENOENT ? LUMI_ERR_NOTFOUND : LUMI_ERR_IO, "%s: %s", drive->name,
                          modbus_strerror(errno));
     return LUMI_OK;
@@ -304,6 +313,7 @@ int lumi_rig_drive_open(const char *address, const struct lumi_drive_map *map, s
     drive->map = *map;
     drive->bus = bus;
     drive->name = g_strdup(address);
+    drive->serial = address[0] == 'r';
     code = set_up(drive, error);
     if (code != LUMI_OK) {
         lumi_rig_drive_close(drive);

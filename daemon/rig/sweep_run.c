@@ -23,7 +23,7 @@ struct course {
     bool begun; /* StartSweep was answered */
     bool restarted;
     int obeyed; /* interrupts that were acted on */
-    uint64_t heard_ns, rest_ns;
+    uint64_t begun_ns, heard_ns, rest_ns;
     char reason[256]; /* the last fault or note */
     struct lumi_error log_error;
 };
@@ -286,7 +286,7 @@ static bool rests(struct course *course, const struct lumi_rig_link_snapshot *sn
 {
     uint64_t now = lumi_rig_link_now();
 
-    if (!snapshot->status_known || snapshot->state != LUMI_RIG_LINK_OPEN ||
+    if (!snapshot->status_known || snapshot->status_ns <= course->begun_ns || snapshot->state != LUMI_RIG_LINK_OPEN ||
         !lumi_rig_state_at_rest(snapshot->status.state) ||
         (int32_t)(course->next_event - snapshot->status.events_next) < 0) {
         course->rest_ns = now;
@@ -300,7 +300,7 @@ static int follow(struct course *course, struct lumi_error *error)
     struct lumi_rig_sweep_run *run = course->run;
     struct lumi_rig_link_snapshot snapshot;
 
-    course->heard_ns = course->rest_ns = lumi_rig_link_now();
+    course->begun_ns = course->heard_ns = course->rest_ns = lumi_rig_link_now();
     while (!run->ended) {
         listen(course, 0.1);
         obey(course);

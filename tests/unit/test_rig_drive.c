@@ -151,6 +151,17 @@ static void a_broken_connection_is_made_again(void **state)
     finish(drive);
 }
 
+static void a_line_that_another_program_has_is_left_alone(void **state)
+{
+    struct lumi_rig_drive *drive = start(false), *second;
+    struct lumi_error error = {0};
+
+    (void)state;
+    assert_int_equal(lumi_rig_drive_open(fake.address, &map, &second, &error), LUMI_ERR_BUSY);
+    assert_non_null(strstr(error.text, "locked"));
+    finish(drive);
+}
+
 static void addresses_of_drives_are_checked(void **state)
 {
     static const char *const bad[] = {"/dev/ttyUSB1",
@@ -411,6 +422,7 @@ int main(void)
         cmocka_unit_test(a_drive_goes_where_it_is_told_over_tcp),
         cmocka_unit_test(what_a_drive_does_wrong_is_tried_again_and_said),
         cmocka_unit_test(a_broken_connection_is_made_again),
+        cmocka_unit_test(a_line_that_another_program_has_is_left_alone),
         cmocka_unit_test(addresses_of_drives_are_checked),
         cmocka_unit_test(maps_that_cannot_be_are_refused_with_their_line),
         cmocka_unit_test(a_sweep_fires_every_shot_once_at_its_place),
