@@ -9,7 +9,7 @@
 #include <stdio.h>
 
 static char *address, *log_path, *drive_address, *map_path;
-static gboolean resume, again, home_drive, json;
+static gboolean resume, again, home_drive, reset_drive, json;
 static double patience = 60;
 
 static const GOptionEntry options[] = {
@@ -23,6 +23,7 @@ static const GOptionEntry options[] = {
      "ADDRESS"},
     {"map", 0, 0, G_OPTION_ARG_FILENAME, &map_path, "the drive's register map (docs/rig-drive.md)", "FILE"},
     {"home-drive", 0, 0, G_OPTION_ARG_NONE, &home_drive, "the drive homes first", NULL},
+    {"reset-drive", 0, 0, G_OPTION_ARG_NONE, &reset_drive, "resets an alarm that the drive still has", NULL},
     CLI_RIG_JSON_OPTION(json),
     {0},
 };
@@ -131,6 +132,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     sweep.again = again;
     sweep.patience = patience;
     sweep.home_drive = home_drive;
+    sweep.reset_drive = reset_drive;
     sweep.utc_offset_ns = cli_rig_utc_offset_ns();
     sweep.interrupts = cli_rig_interrupts;
     sweep.progress = progress;

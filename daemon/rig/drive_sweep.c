@@ -126,6 +126,24 @@ static int wait_for_drive(struct watch *watch, double turns, double seconds, str
                      status.reached ? "it says it stands" : "it moves or stands", status.turns);
 }
 
+/* Only what was there before, and only on the operator's word: an alarm in the middle ends the sweep. */
+static int reset_alarm(struct watch *watch, struct lumi_error *error)
+{
+    struct lumi_rig_drive_sweep *sweep = watch->sweep;
+    uint64_t deadline = seconds_from_now(ENABLE_SECONDS);
+    struct lumi_rig_drive_status status;
+
+    LUMI_TRY(lumi_rig_drive_status(sweep->drive, &status, error));
+    if (!status.fault || !sweep->reset)
+        return LUMI_OK;
+    LUMI_TRY(lumi_rig_drive_reset(sweep->drive, error));
+    while (status.fault && lumi_rig_link_now() < deadline) {
+        listen(watch, ASK_SECONDS);
+        LUMI_TRY(lumi_rig_drive_status(sweep->drive, &status, error));
+    }
+    return LUMI_OK; /* one that stands is seen when the drive is switched on */
+}
+
 static int switch_on(struct watch *watch, struct lumi_error *error)
 {
     struct lumi_rig_drive_sweep *sweep = watch->sweep;
@@ -233,6 +251,7 @@ int lumi_rig_drive_sweep(struct lumi_rig_drive_sweep *sweep, struct lumi_error *
     LUMI_TRY(check(sweep, error));
     listen(&watch, 0); /* what was before this sweep is not its own */
     watch.faulted = watch.restarted = false;
+    LUMI_GOTO(code, done, reset_alarm(&watch, error));
     LUMI_GOTO(code, done, switch_on(&watch, error));
     if (sweep->home)
         LUMI_GOTO(code, done, home(&watch, error));

@@ -354,6 +354,7 @@ static int drive_it(struct course *course, struct lumi_error *error)
                                          .plan = run->plan,
                                          .first_shot = run->fired,
                                          .home = run->home_drive,
+                                         .reset = run->reset_drive,
                                          .context = course,
                                          .notice = drive_notice,
                                          .cancelled = drive_cancelled};

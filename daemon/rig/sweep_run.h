@@ -24,7 +24,7 @@ struct lumi_rig_sweep_run {
     double patience; /* s without a word from the board before it is given up (60) */
     struct lumi_rig_sweep_log *log;
     struct lumi_rig_drive *drive; /* of a rig that has one; otherwise NULL */
-    bool home_drive;
+    bool home_drive, reset_drive;
     int64_t utc_offset_ns; /* Unix time less CLOCK_MONOTONIC */
     void *context;
     /* How often the operator has asked to stop so far: once pauses at the next safe place, twice stops now, three times

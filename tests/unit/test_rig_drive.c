@@ -378,6 +378,25 @@ static void trouble_with_the_drive_ends_the_sweep_with_its_reason(void **state)
     }
 }
 
+static void an_alarm_from_before_is_reset_on_the_operators_word_only(void **state)
+{
+    struct lumi_rig_drive_sweep sweep;
+    struct lumi_error error = {0};
+
+    (void)state;
+    start_sweep(&sweep);
+    fake.fault = true;
+    fake.fault_code = 7;
+    assert_int_equal(lumi_rig_drive_sweep(&sweep, &error), LUMI_ERR_IO);
+    assert_non_null(strstr(error.text, "fault 7"));
+    assert_int_equal(fake.resets, 0);
+    sweep.reset = true;
+    assert_int_equal(lumi_rig_drive_sweep(&sweep, &error), LUMI_OK);
+    assert_int_equal(fake.resets, 1);
+    assert_int_equal(fired_count, 16);
+    end_sweep(&sweep);
+}
+
 static void only_start_stop_and_only_rigs_with_such_a_drive(void **state)
 {
     struct lumi_rig_drive_sweep sweep;
@@ -429,6 +448,7 @@ int main(void)
         cmocka_unit_test(a_sweep_goes_on_from_a_shot),
         cmocka_unit_test(an_emergency_stop_on_the_board_ends_the_sweep_and_stops_the_drive),
         cmocka_unit_test(trouble_with_the_drive_ends_the_sweep_with_its_reason),
+        cmocka_unit_test(an_alarm_from_before_is_reset_on_the_operators_word_only),
         cmocka_unit_test(only_start_stop_and_only_rigs_with_such_a_drive),
         cmocka_unit_test(a_sweep_can_be_stopped_between_positions),
     };
