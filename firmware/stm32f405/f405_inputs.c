@@ -133,9 +133,9 @@ void EXTI15_10_Handler(void)
  * capture, as long as this handler is not held off for longer. */
 static void tell_feedback(int input)
 {
+    uint32_t count;
     const uint32_t primask = irq_disable();
-    const uint32_t count = TIM_CNT(TIM3_BASE);
-    const uint64_t now = time_now();
+    const uint64_t now = time_of_count(TIM3_BASE, &count);
     irq_restore(primask);
     const uint64_t at = now - (uint16_t)(count - TIM_CCR(TIM3_BASE, 1 + input)); /* reading clears CCxIF */
     const bool active = pin_feedback(input);

@@ -76,18 +76,13 @@ static void preload(void)
 }
 
 /* With interrupts off. The timer starts with nothing in force; when it passed 0 is read from both counters; then its
- * first period is set, which without ARPE holds at once. Between TIM5's two readings lies TIM2's: the middle of them
- * is right to a tick. */
+ * first period is set, which without ARPE holds at once. */
 static void launch(uint64_t at)
 {
-    uint32_t first_lap;
+    uint32_t count, first_lap;
 
     TIM_CR1(TIM) = RUN_FREE;
-    const uint32_t before = TIM_CNT(TIM5_BASE);
-    const uint32_t count = TIM_CNT(TIM);
-    const uint32_t after = TIM_CNT(TIM5_BASE);
-    const uint64_t now = time_now();
-    const uint64_t zero = now - ((uint32_t)now - before) + (after - before) / 2 - count;
+    const uint64_t zero = time_of_count(TIM, &count) - count;
     const uint64_t delay = at - zero;
 
     first_lap = delay > 2 * (uint64_t)LAP ? LAP : (uint32_t)delay;

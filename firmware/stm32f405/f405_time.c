@@ -52,6 +52,16 @@ uint64_t time_now(void)
     return (uint64_t)wraps << 32 | low;
 }
 
+uint64_t time_of_count(uint32_t timer, uint32_t *count)
+{
+    const uint32_t before = TIM_CNT(TIM);
+    *count = TIM_CNT(timer);
+    const uint32_t after = TIM_CNT(TIM);
+    const uint64_t now = time_now();
+
+    return now - ((uint32_t)now - before) + (after - before) / 2;
+}
+
 /* Status bits are cleared by writing 0, and 1 leaves them: section 18.4.5. */
 static void count_wrap(void)
 {
@@ -71,7 +81,8 @@ static void put_out(void)
         now = TIM_CNT(TIM);
     while ((int32_t)(now - at) < 0);
     GPIO_BSRR(GPIOB_BASE) = lines;
-    edge.fired_at = time_now() - (TIM_CNT(TIM) - now);
+    const uint64_t then = time_now();
+    edge.fired_at = then - ((uint32_t)then - now);
     TIM_DIER(TIM) = QUIET;
     edge.armed = false;
     edge.fired = true;

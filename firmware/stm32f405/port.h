@@ -37,6 +37,9 @@ void interrupt_enable(unsigned irq, unsigned priority);
 /* f405_time.c: TIM5 as the clock, trigger edges on its channel 1 */
 void time_init(void);
 uint64_t time_now(void);
+/* What another timer's counter was, and when: TIM5's readings before and after it are a few ticks apart, and their
+ * middle is right to a tick. With interrupts off. */
+uint64_t time_of_count(uint32_t timer, uint32_t *count);
 void trigger_at(uint64_t at, uint16_t lines);
 void trigger_cancel(void);
 void trigger_lines(uint16_t lines);
