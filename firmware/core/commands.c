@@ -242,8 +242,18 @@ static void set_output(struct core *core, const lumi_wire_SetOutput *set, lumi_w
 
 static void enter_loader(struct core *core, lumi_wire_Reply *reply)
 {
-    if (!core_refuse_unless_rest(core, reply))
-        core->board->enter_loader(core->board->port);
+    if (core_refuse_unless_rest(core, reply))
+        return;
+    /* In the loader no pin of the board is driven. */
+    if (core->has_profile && !drop_string_held(core)) {
+        drop_string_close(core);
+        core_refuse(reply, lumi_wire_Result_REFUSED,
+                    core->rig.control.safety.brake_fitted
+                        ? "loader: the brake is closing; ask again in a second"
+                        : "loader: without current nothing would hold the arm; take it off and use the boot jumper");
+        return;
+    }
+    core->board->enter_loader(core->board->port);
 }
 
 /* What is given and taken: commands_store.c. */

@@ -26,8 +26,7 @@ static void set_enabled(struct core *core, bool enabled)
         motion_forget(&core->motion); /* a platform without current can be turned by hand */
 }
 
-/* The arm is held by something else than the motor: by the brake, or it has no string. */
-static bool held_otherwise(const struct core *core)
+bool drop_string_held(const struct core *core)
 {
     const struct drop_string *s = &core->string;
 
@@ -87,13 +86,13 @@ void drop_string_release(struct core *core)
 {
     set_brake(core, false);
     core->string.off_wanted = true;
-    if (held_otherwise(core))
+    if (drop_string_held(core))
         set_enabled(core, false);
 }
 
 bool drop_string_set_enable(struct core *core, bool active)
 {
-    if (!active && !held_otherwise(core))
+    if (!active && !drop_string_held(core))
         return false;
     set_enabled(core, active);
     return true;
@@ -113,7 +112,7 @@ void drop_string_poll(struct core *core)
     struct drop_string *s = &core->string;
     const uint64_t now = core->now;
 
-    if (s->off_wanted && held_otherwise(core))
+    if (s->off_wanted && drop_string_held(core))
         set_enabled(core, false);
     if (!state_at_rest(core->state)) {
         s->rest_at = now;

@@ -34,6 +34,8 @@ bool drop_string_ready(struct core *core);
 void drop_string_close(struct core *core);
 /* The motor lets go as soon as the arm is held otherwise; where nothing else can hold it, it does not. */
 void drop_string_release(struct core *core);
+/* Something else than the motor holds the arm: the brake, for long enough, or it hangs on no string. */
+bool drop_string_held(const struct core *core);
 /* The bench's direct hand: false where it would let the arm fall. */
 bool drop_string_set_enable(struct core *core, bool active);
 bool drop_string_set_brake(struct core *core, bool open);

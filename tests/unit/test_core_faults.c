@@ -106,7 +106,11 @@ static void a_motor_goes_off_only_when_the_brake_holds(void **state)
     assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_DONE);
     bench_home(b);
     assert_true(b->outputs[BOARD_OUT_ENABLE]);
-    /* The bench's direct hand cannot drop the arm either. */
+    /* Neither a loader, which drives no pin … */
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(enter_loader, 0)), lumi_wire_Result_REFUSED);
+    assert_string_equal(b->reply.text, "loader: the brake is closing; ask again in a second");
+    bench_run(b, 1);
+    /* … nor the bench's direct hand can drop the arm. */
     assert_int_equal(bench_ask(b, BENCH_REQUEST(set_output, lumi_wire_SetOutput_Output_BRAKE_OPEN, true)),
                      lumi_wire_Result_DONE);
     assert_int_equal(bench_ask(b, BENCH_REQUEST(set_output, lumi_wire_SetOutput_Output_ENABLE, false)),
