@@ -275,7 +275,7 @@ static void nobody_at_the_other_end_is_said(void **state)
     start("pty");
     set_mute(true);
     link = open_link(0.2);
-    assert_int_equal(lumi_rig_link_wait(link, 0.4, true, &error), LUMI_ERR_IO);
+    assert_int_equal(lumi_rig_link_wait(link, 1, true, &error), LUMI_ERR_IO);
     assert_non_null(strstr(error.text, "nothing answers"));
     lumi_rig_link_close(link);
     fake_board_stop(&board);
