@@ -86,8 +86,10 @@ void motion_halt(struct motion *motion)
 
 void motion_release(struct motion *motion)
 {
-    if (motion->halted)
+    if (motion->halted) {
         motion->curve = false;
+        motion->rest_at = 0; /* the end of a move that was broken off holds nothing up */
+    }
     motion->starved = motion->halted = false;
 }
 

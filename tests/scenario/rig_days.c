@@ -75,6 +75,8 @@ static void an_emergency_stop_ends_the_steps_and_is_released_only_by_a_clear(voi
 
     (void)state;
     begin(&f, "arc16", 30);
+    /* A main loop of 3 ms, three steps long: the stop cannot wait for it. */
+    host_board_set_loop(sim_machine_board(f.machine), 3 * BOARD_TICK_HZ / 1000, BOARD_TICK_HZ / 20);
     goes_wrong(&f, "at shot 30 estop press for 4s\n");
     lumi_wire_SweepEnded end = go(&f, 0, false);
     assert_int_equal(end.how, lumi_wire_SweepEnded_How_FAULTED);
@@ -234,6 +236,28 @@ static void a_paused_sweep_goes_on_where_it_was(void **state)
     rig_fixture_finish(&f);
 }
 
+static void a_stop_while_the_string_is_wound_delays_nothing_afterwards(void **state)
+{
+    struct rig_fixture f;
+    struct sim_machine_options options;
+
+    (void)state;
+    rig_fixture_init(&f, "bar2");
+    options = f.options;
+    options.mechanics.start_turns = 12.4;
+    f.machine = sim_machine_create(&f.rig, &options);
+    OK(sim_machine_configure(f.machine, &f.rig, error));
+    goes_wrong(&f, "at 10s estop press for 1s\n");
+    assert_int_equal(sim_machine_home(f.machine, true, 0, &expected_error), LUMI_ERR_NOTFOUND);
+    assert_true(sim_machine_seconds(f.machine) < 15);
+    sim_machine_run(f.machine, 2);
+    OK(sim_machine_clear(f.machine, error));
+    OK(sim_machine_home(f.machine, true, 0, error));
+    assert_true(sim_machine_seconds(f.machine) < 150); /* 12 turns at 8 s, and the search for the mark */
+    assert_int_equal(status_of(&f).turn_known, true);
+    rig_fixture_finish(&f);
+}
+
 static void whoever_reaches_the_board_can_stop_it(void **state)
 {
     struct rig_fixture f;
@@ -303,6 +327,7 @@ int main(void)
         cmocka_unit_test(a_string_that_is_out_or_loose_stops_the_sweep),
         cmocka_unit_test(a_board_that_hangs_is_started_anew_and_only_homes),
         cmocka_unit_test(a_paused_sweep_goes_on_where_it_was),
+        cmocka_unit_test(a_stop_while_the_string_is_wound_delays_nothing_afterwards),
         cmocka_unit_test(whoever_reaches_the_board_can_stop_it),
         cmocka_unit_test(power_that_goes_while_a_profile_is_written_leaves_the_old_or_the_new),
     };

@@ -38,6 +38,10 @@ static void choose(struct rig_operator *o, int seed)
     }
     sim_machine_options_init(&f->options, &f->rig);
     f->options.seed = (uint64_t)seed;
+    /* Main loops of 20 µs, 1 ms and 2 ms: only interrupts are on time. */
+    f->options.loop_latency =
+        seed / 3 % 3 == 0 ? BOARD_TICK_HZ / 50000 : (uint32_t)(seed / 3 % 3) * (BOARD_TICK_HZ / 1000);
+    f->options.loop_longest = BOARD_TICK_HZ / 20;
     f->options.link = seed % 2 ? BOARD_LINK_USB : BOARD_LINK_SERIAL;
     if (f->options.link == BOARD_LINK_SERIAL)
         f->options.link_rate = 11520;
