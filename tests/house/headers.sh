@@ -7,7 +7,7 @@ shift 4
 
 cd "$root"
 count=0 bad=0
-for header in $(find proto render pipeline sim cli -name '*.h' | sort); do
+for header in $(find proto daemon render pipeline sim cli -name '*.h' | sort); do
     count=$((count + 1))
     printf '#include "%s"\n#include "%s"\nextern int lumi_header_alone;\n' "$header" "$header" |
         "$cc" -std=c17 -fsyntax-only -Wall -Wextra -Werror -x c "$@" - || { echo "$header: not alone in C"; bad=1; }
