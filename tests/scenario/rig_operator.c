@@ -152,16 +152,42 @@ static int camera_of_channel(const struct lumi_rig *rig, int channel)
     return -1;
 }
 
-/* Finds the record of a trigger edge, and marks it. */
-static bool claim(const struct sim_exposure *records, bool *claimed, int count, int camera, uint64_t tick)
+/* Whether something in the script may rightly put a shot where it does not belong: steps that are lost are found at the
+ * next mark only, a switch that lies may mislead homing, a camera that lags is late. */
+static bool angles_are_sure(const struct rig_operator *o)
+{
+    for (int i = 0; i < o->script.count; i++) {
+        const struct sim_fault *fault = &o->script.faults[i];
+        bool input = fault->kind == SIM_FAULT_INPUT || fault->kind == SIM_FAULT_PULSE;
+        if (fault->kind == SIM_FAULT_SLIP || fault->kind == SIM_FAULT_CAMERA_LAG ||
+            (input && (fault->index == BOARD_IN_INDEX || fault->index == BOARD_IN_WOUND)))
+            return false;
+    }
+    return true;
+}
+
+/* Within half a degree, at 36 degrees/s and with what is left of a start's swing: the position was what it was said to
+ * be. */
+static bool judge_angle(struct rig_operator *o, uint32_t shot, const struct sim_exposure *e)
+{
+    double position = (double)(shot / (uint32_t)o->f.plan.bracket) / o->f.plan.positions;
+    double want = lumi_rig_turn_angle(&o->f.rig, o->f.plan.first_turn + position);
+
+    if (e->lost || !e->done || fabs(e->angle - want) < 0.5 * DEGREE)
+        return true;
+    return wrong(o, "shot %u: camera %d is off by %.3f degrees", (unsigned)shot, e->camera, (e->angle - want) / DEGREE);
+}
+
+/* Finds the record of a trigger edge, and marks it; −1: there is none. */
+static int claim(const struct sim_exposure *records, bool *claimed, int count, int camera, uint64_t tick)
 {
     for (int i = 0; i < count; i++)
         if (!claimed[i] && records[i].camera == camera && records[i].trigger + 84 >= tick &&
             records[i].trigger <= tick + 84) {
             claimed[i] = true;
-            return true;
+            return i;
         }
-    return false;
+    return -1;
 }
 
 /* Every edge that the board tells of was seen by its camera once; a shot that is told as fired has all its edges; none
@@ -177,9 +203,12 @@ static bool judge_shot(struct rig_operator *o, const lumi_wire_Shot *shot, const
             continue;
         int camera = camera_of_channel(&o->f.rig, channel);
         uint64_t tick = ticks_of(shot->middle_ns + (uint64_t)(int64_t)shot->edge_ns[k++]);
-        if (camera < 0 || !claim(records, claimed, count, camera, tick))
+        int record = camera < 0 ? -1 : claim(records, claimed, count, camera, tick);
+        if (record < 0)
             return wrong(o, "shot %u: camera %d saw no trigger at %.6f s", (unsigned)shot->number, camera,
                          (double)tick / BOARD_TICK_HZ);
+        if (!shot->lost && angles_are_sure(o) && !judge_angle(o, shot->number, &records[record]))
+            return false;
         cameras |= 1u << camera;
     }
     if (!shot->lost && cameras != lumi_plan_cameras(&o->f.plan, &o->f.rig))
