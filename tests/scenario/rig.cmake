@@ -1,6 +1,6 @@
 lumi_test(rig_sweeps FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
 lumi_test(rig_video FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
-# A thousand bad days take 20 s of one core; under sanitizers the first hundred do.
+# A thousand bad days take 25 s of one core; under sanitizers the first hundred do.
 lumi_test(rig_faults FOLDERS sim_rig firmware_host firmware_core wire mechanism base)
 target_sources(rig_faults PRIVATE rig_operator.c)
 if(LUMI_SANITIZE)

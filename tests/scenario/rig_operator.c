@@ -167,15 +167,17 @@ static bool angles_are_sure(const struct rig_operator *o)
 }
 
 /* Within half a degree, at 36 degrees/s and with what is left of a start's swing: the position was what it was said to
- * be. */
+ * be, and on a string the turn too. */
 static bool judge_angle(struct rig_operator *o, uint32_t shot, const struct sim_exposure *e)
 {
     double position = (double)(shot / (uint32_t)o->f.plan.bracket) / o->f.plan.positions;
     double want = lumi_rig_turn_angle(&o->f.rig, o->f.plan.first_turn + position);
 
-    if (e->lost || !e->done || fabs(e->angle - want) < 0.5 * DEGREE)
+    double error = o->f.rig.string.held ? remainder(e->angle - want, 2 * LUMI_PI) : e->angle - want;
+
+    if (e->lost || !e->done || fabs(error) < 0.5 * DEGREE)
         return true;
-    return wrong(o, "shot %u: camera %d is off by %.3f degrees", (unsigned)shot, e->camera, (e->angle - want) / DEGREE);
+    return wrong(o, "shot %u: camera %d is off by %.3f degrees", (unsigned)shot, e->camera, error / DEGREE);
 }
 
 /* Finds the record of a trigger edge, and marks it; −1: there is none. */
