@@ -196,6 +196,22 @@ static void the_link_lives_through_suspend_reset_and_unplugging(void **state)
     board_fixture_finish(&f);
 }
 
+static void the_board_goes_to_the_chips_own_loader_when_it_is_asked_to(void **state)
+{
+    struct board_fixture f;
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_enter_loader_tag};
+    struct lumi_error error = {0};
+    (void)state;
+    board_fixture_init(&f);
+    board_fixture_connect(&f, BOARD_LINK_USB);
+    int code = board_client_request(f.client, &request, NULL, &error);
+    if (code == LUMI_OK)
+        code = board_client_run(f.client, 3, &error);
+    assert_int_equal(code, LUMI_ERR_CANCELLED); /* the program counter is in system memory */
+    assert_int_equal(f405_resets(f405_machine_chip(f.machine)), 2);
+    board_fixture_finish(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -206,6 +222,7 @@ int main(void)
         cmocka_unit_test(frames_of_every_length_pass_with_their_empty_packets),
         cmocka_unit_test(more_than_a_packet_holds_is_not_taken),
         cmocka_unit_test(the_link_lives_through_suspend_reset_and_unplugging),
+        cmocka_unit_test(the_board_goes_to_the_chips_own_loader_when_it_is_asked_to),
     };
     return board_image_is_there() ? cmocka_run_group_tests(tests, NULL, NULL) : 77;
 }
