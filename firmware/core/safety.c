@@ -119,6 +119,9 @@ static void react(struct core *core, enum lumi_rig_fault fault)
         return; /* still sweeping, to the row's end */
     if (r.motor >= LUMI_RIG_MOTOR_HALT)
         halt(core, r.motor == LUMI_RIG_MOTOR_OFF);
+    /* The motor may have been without current for as long as it took to notice: steps then moved nothing. */
+    if ((fault == LUMI_RIG_FAULT_DRIVER || fault == LUMI_RIG_FAULT_SUPPLY) && !motion_moving(&core->motion))
+        motion_forget(&core->motion);
     if (knew && !motion_known(&core->motion))
         firing_spoil(&core->firing);
     index_watch_end(&core->safety.watch);
@@ -323,8 +326,10 @@ void safety_poll(struct core *core)
     watch_index(core);
     watch_speed(core);
     watch_host(core);
-    if (motion_starved(&core->motion))
+    if (motion_starved(&core->motion) && !(s->standing & BIT(LUMI_RIG_FAULT_INTERNAL))) {
+        firing_spoil(&core->firing); /* what was put out meanwhile was put out where the platform was not */
         safety_raise(core, LUMI_RIG_FAULT_INTERNAL, "the steps ran out: the main loop was late");
+    }
 }
 
 uint64_t safety_next_poll(const struct core *core)

@@ -47,15 +47,19 @@ static void choose(struct rig_operator *o, int seed)
         f->options.link_rate = 11520;
 }
 
-/* Without a brake an arm on its string falls whenever the motor has no current, and no firmware can help that. */
+/* Without a brake an arm on its string falls whenever the motor has no current, and with one where the driver's fault
+ * does not reach the board: no firmware can help that. */
 static void spare_the_arm(struct rig_operator *o)
 {
-    if (o->f.rig.string.held || o->f.rig.control.safety.brake_fitted)
-        return;
+    bool braked = o->f.rig.string.held || o->f.rig.control.safety.brake_fitted, deaf = false;
     int kept = 0;
+
+    for (int i = 0; i < o->script.count; i++)
+        deaf |= o->script.faults[i].kind == SIM_FAULT_INPUT && o->script.faults[i].index == BOARD_IN_DRIVER_FAULT;
     for (int i = 0; i < o->script.count; i++) {
         enum sim_fault_kind kind = o->script.faults[i].kind;
-        if (kind != SIM_FAULT_DRIVER && kind != SIM_FAULT_SUPPLY && kind != SIM_FAULT_POWER)
+        bool driver = kind == SIM_FAULT_DRIVER, power = kind == SIM_FAULT_SUPPLY || kind == SIM_FAULT_POWER;
+        if (braked ? !(driver && deaf) : !driver && !power)
             o->script.faults[kept++] = o->script.faults[i];
     }
     o->script.count = kept;
