@@ -76,7 +76,10 @@ static void act(struct rig_operator *o)
             o->complete = true; /* its end was told while nobody listened */
             return;
         }
-        if (sim_machine_start(m, first_missing(o), true, &error) != LUMI_OK) {
+        int code = sim_machine_start(m, first_missing(o), true, &error);
+        if (code == LUMI_ERR_BUSY && !o->f.rig.string.held) {
+            sim_machine_home(m, true, 0, &error); /* a string that hangs loose is wound up first */
+        } else if (code != LUMI_OK) {
             sim_machine_run(m, 1);
         } else if (sim_machine_wait_sweep(m, 120, &error) == LUMI_OK) {
             const lumi_wire_Event *end = sim_machine_find(m, from, lumi_wire_Event_sweep_ended_tag);
