@@ -104,6 +104,11 @@ static void jog(struct core *core, const lumi_wire_Jog *jog_command, lumi_wire_R
     int64_t steps = llround(jog_command->turns * core->steps_per_turn);
     if (steps == 0)
         return;
+    const double turns = (double)(motion_position(&core->motion) + steps) / core->steps_per_turn;
+    if (steps > 0 && !core->rig.string.held && turns * core->rig.string.per_turn > core->rig.string.length) {
+        core_refuse(reply, lumi_wire_Result_BAD, "jog: beyond the end of the string");
+        return;
+    }
     core->jog_target = motion_position(&core->motion) + steps;
     core->jog_limits = core_limits(core, speed);
     core->begun = false;

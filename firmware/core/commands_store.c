@@ -35,7 +35,7 @@ void core_command_load_plan(struct core *core, const lumi_wire_LoadPlan *load, l
     core->plan_crc = crc;
     core->has_plan = true;
     firing_plan_again(&core->firing, 0, LUMI_PLAN_SHOTS_MAX);
-    core->sweep = (struct sweep){.recording = core->sweep.recording};
+    core->sweep = (struct sweep){.active = false};
 }
 
 void core_command_read_plan(struct core *core, lumi_wire_Reply *reply)
@@ -92,6 +92,11 @@ void core_command_commit_profile(struct core *core, const lumi_wire_CommitProfil
         return;
     if (core->safety.standing != 0) {
         core_refuse(reply, lumi_wire_Result_REFUSED, "not while a fault stands");
+        return;
+    }
+    if (firing_busy_now(&core->firing)) {
+        core_refuse(reply, lumi_wire_Result_REFUSED,
+                    "not while a trigger is up"); /* their edges lie where it is read */
         return;
     }
     if (commit->size == 0 || commit->size != core->uploaded ||

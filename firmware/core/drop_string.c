@@ -69,8 +69,10 @@ bool drop_string_ready(struct core *core)
 
     s->resting = false;
     set_enabled(core, true);
-    if (!brake_opens(core))
-        return now >= s->enabled_at + DROP_STRING_BRAKE_TICKS;
+    if (!brake_opens(core)) {
+        set_brake(core, false); /* somebody may have opened it by hand */
+        return now >= s->enabled_at + DROP_STRING_BRAKE_TICKS && now >= s->brake_at + DROP_STRING_BRAKE_TICKS;
+    }
     if (now < s->enabled_at + DROP_STRING_BRAKE_TICKS)
         return false; /* the current builds up first */
     set_brake(core, true);

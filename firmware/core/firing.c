@@ -5,9 +5,9 @@
 #define LINE_GAP_TICKS (BOARD_TICK_HZ / 1000) /* a trigger line is down at least 1 ms before it goes up again */
 #define SHOOT_MARGIN_TICKS (BOARD_TICK_HZ / 4000)
 
-static uint32_t ticks_of(double seconds)
+static uint64_t ticks_of(double seconds)
 {
-    return seconds > 0 ? (uint32_t)(seconds * BOARD_TICK_HZ + 0.5) : 0;
+    return seconds > 0 ? (uint64_t)(seconds * BOARD_TICK_HZ + 0.5) : 0;
 }
 
 static uint64_t larger(uint64_t a, uint64_t b)
@@ -38,9 +38,9 @@ static void take_cameras(struct firing *firing, const struct lumi_rig *rig, uint
                                     .channel = (int8_t)t->channel,
                                     .focus_channel = (int8_t)(t->focus_lead > 0 ? t->focus_channel : -1),
                                     .feedback = (int8_t)t->feedback,
-                                    .lag = ticks_of(t->shutter_lag),
-                                    .pulse = ticks_of(t->pulse),
-                                    .focus_lead = ticks_of(t->focus_lead),
+                                    .lag = (uint32_t)ticks_of(t->shutter_lag),
+                                    .pulse = (uint32_t)ticks_of(t->pulse),
+                                    .focus_lead = (uint32_t)ticks_of(t->focus_lead),
                                     .busy = ticks_of(t->busy)};
         firing->camera_of_channel[t->channel] = (uint8_t)i;
         firing->shot_edges += c->focus_channel >= 0 ? 3 : 2;
@@ -252,6 +252,8 @@ bool firing_test(struct firing *firing, const struct lumi_rig *rig, uint32_t cam
 
     if (firing_busy_now(firing))
         return false;
+    firing_recording(firing);
+    firing->record_asked = false; /* these pulses are none of its */
     take_cameras(firing, rig, cameras);
     if (firing->camera_count == 0)
         return false;
@@ -272,18 +274,44 @@ bool firing_test(struct firing *firing, const struct lumi_rig *rig, uint32_t cam
     return true;
 }
 
+bool firing_recording(struct firing *firing)
+{
+    if (firing->record_asked && firing->pulses != firing->pulses_before) {
+        firing->recording = firing->record_start;
+        firing->record_asked = false;
+    }
+    return firing->recording;
+}
+
+/* A record pulse is about to be queued. */
+static void ask_record(struct firing *firing, bool start)
+{
+    firing_recording(firing);
+    firing->record_asked = true;
+    firing->record_start = start;
+    firing->pulses_before = firing->pulses;
+}
+
 bool firing_record(struct firing *firing, const struct lumi_rig *rig, uint32_t cameras, bool start, uint64_t at)
 {
     const uint32_t stops = firing->stops;
-    const uint32_t pulse = ticks_of(rig->control.video.record_pulse);
-    uint16_t lines = 0;
+    const uint64_t pulse = ticks_of(rig->control.video.record_pulse);
 
-    take_cameras(firing, rig, cameras);
-    for (int i = 0; i < firing->camera_count; i++)
-        lines |= (uint16_t)(1u << firing->cameras[i].channel);
     if (firing_room(firing) < 2)
         return false;
+    ask_record(firing, start);
+    if (start) {
+        take_cameras(firing, rig, cameras);
+        firing->record_lines = 0;
+        for (int i = 0; i < firing->camera_count; i++)
+            firing->record_lines |= (uint16_t)(1u << firing->cameras[i].channel);
+    }
+    const uint16_t lines = firing->record_lines;
     if (pulse > 0)
         return queue_pulse(firing, lines, at, at + pulse, stops);
-    return firing_queue(firing, &(struct firing_edge){at, start ? lines : 0, start ? 0 : lines, FIRING_NO_SLOT}, stops);
+    if (start)
+        return firing_queue(firing, &(struct firing_edge){at, lines, 0, FIRING_NO_SLOT}, stops);
+    /* Held lines that fall: now, or they have fallen already. */
+    firing->record_asked = firing->recording = false;
+    return firing_queue(firing, &(struct firing_edge){at, 0, lines, FIRING_NO_SLOT}, stops);
 }

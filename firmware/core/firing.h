@@ -71,8 +71,8 @@ void firing_stop(struct firing *firing, bool finish);
 void firing_release(struct firing *firing);
 /* The platform is not where it should be: what has begun is finished and lost. */
 void firing_spoil(struct firing *firing);
-bool firing_begun(const struct firing *firing);    /* a shot is under way */
-bool firing_busy_now(const struct firing *firing); /* lines are up or queued, or exposures under way */
+bool firing_begun(const struct firing *firing, uint32_t first); /* a shot from `first` on is under way */
+bool firing_busy_now(const struct firing *firing);              /* lines are up or queued, or exposures under way */
 enum shot_state firing_state(const struct firing *firing, uint32_t number);
 /* Queued or under way: its state is still to come. */
 bool firing_pending(const struct firing *firing, uint32_t number);
@@ -82,8 +82,11 @@ void firing_count(const struct firing *firing, uint32_t *fired, uint32_t *lost);
 /* One pattern outside a sweep: each channel of `cameras` alone, one after another; `exposure` and `gap` in seconds.
  * False: something is under way, or no such camera is wired. */
 bool firing_test(struct firing *firing, const struct lumi_rig *rig, uint32_t cameras, double exposure, double gap);
-/* A record pulse on the cameras' lines (video): start or stop. False: the queue is full. */
+/* A record pulse on the cameras' lines (video): start, or stop for those that were started. False: the queue is full,
+ * or everything was stopped. */
 bool firing_record(struct firing *firing, const struct lumi_rig *rig, uint32_t cameras, bool start, uint64_t at);
+/* The cameras have had their start pulse, and no stop; a pulse that was queued and dropped counts for nothing. */
+bool firing_recording(struct firing *firing);
 
 void firing_poll(struct firing *firing);
 uint64_t firing_next_poll(const struct firing *firing);

@@ -1,6 +1,8 @@
 /* The queue of edges: sorted by time, one pattern at a time in the board's hands; and what comes back from there. */
 #include "firmware/core/firing_state.h"
 
+#include <stdatomic.h>
+
 #define RETRY_TICKS (BOARD_TICK_HZ / 1000000)
 
 static struct firing_edge *edge_at(struct firing *firing, unsigned i)
@@ -92,8 +94,10 @@ bool firing_queue(struct firing *firing, const struct firing_edge *edge, uint32_
 static void stamp(struct firing *firing, const struct firing_edge *edge, uint64_t at)
 {
     firing->lines = apply(edge, firing->holds, firing->lines);
-    if (edge->slot == FIRING_NO_SLOT)
+    if (edge->slot == FIRING_NO_SLOT) {
+        firing->pulses += edge->rise != 0;
         return;
+    }
     struct firing_slot *slot = &firing->slots[edge->slot];
     slot->edges_left--;
     if (slot->use == SLOT_QUEUED)
@@ -133,7 +137,9 @@ static void stop_all(struct firing *firing)
 
     for (unsigned i = 0; near && i < firing->armed; i++) {
         struct firing_edge *edge = edge_at(firing, i);
-        if (edge->slot != FIRING_NO_SLOT && firing->slots[edge->slot].use == SLOT_QUEUED)
+        if (edge->slot == FIRING_NO_SLOT)
+            firing->pulses += edge->rise != 0;
+        else if (firing->slots[edge->slot].use == SLOT_QUEUED)
             firing->slots[edge->slot].use = SLOT_BEGUN;
     }
     board->trigger_cancel(board->port);
@@ -211,10 +217,10 @@ void firing_spoil(struct firing *firing)
             firing->slots[i].late = true;
 }
 
-bool firing_begun(const struct firing *firing)
+bool firing_begun(const struct firing *firing, uint32_t first)
 {
     for (int i = 0; i < FIRING_SLOTS; i++)
-        if (firing->slots[i].use == SLOT_BEGUN)
+        if (firing->slots[i].use == SLOT_BEGUN && firing->slots[i].number >= first)
             return true;
     return false;
 }
@@ -236,6 +242,7 @@ void firing_on_feedback(struct firing *firing, int input, bool active, uint64_t 
         return;
     }
     firing->stamps[in % FIRING_STAMPS] = (struct firing_stamp){at, (uint8_t)input, active};
+    atomic_signal_fence(memory_order_seq_cst); /* the stamp before its number, for the compiler too */
     firing->stamps_in = in + 1;
 }
 
@@ -263,7 +270,9 @@ static uint32_t shot_of(const struct firing *firing, int input, uint64_t at)
 static void poll_stamps(struct firing *firing)
 {
     while (firing->stamps_out != firing->stamps_in) {
+        atomic_signal_fence(memory_order_seq_cst);
         struct firing_stamp stamp_in = firing->stamps[firing->stamps_out % FIRING_STAMPS];
+        atomic_signal_fence(memory_order_seq_cst);
         firing->stamps_out = firing->stamps_out + 1;
         if (stamp_in.input >= LUMI_RIG_FEEDBACKS)
             continue;

@@ -35,8 +35,8 @@ struct firing_slot {
 struct firing_camera {
     uint8_t camera;
     int8_t channel, focus_channel, feedback;
-    uint32_t lag, pulse, focus_lead, busy;
-    uint64_t free_at; /* from then on it takes a trigger */
+    uint32_t lag, pulse, focus_lead; /* up to 10 s; 32 bits hold 51 */
+    uint64_t busy, free_at;          /* free_at: from then on it takes a trigger */
 };
 
 struct firing_stamp {
@@ -68,6 +68,11 @@ struct firing {
     volatile uint32_t stops; /* how often everything was stopped: what was being queued then is given up */
     volatile enum firing_gate gate;
     struct firing_slot slots[FIRING_SLOTS];
+    /* Record pulses: told by those that have gone up, for what is queued may be dropped. */
+    volatile uint32_t pulses; /* outside any shot, that have gone up */
+    uint32_t pulses_before;   /* … when a record pulse was asked for */
+    bool record_asked, record_start, recording;
+    uint16_t record_lines;
     /* From interrupt to main loop; each writes one of the two counters. */
     struct firing_stamp stamps[FIRING_STAMPS];
     volatile uint32_t stamps_in, stamps_out;

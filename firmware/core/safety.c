@@ -219,6 +219,8 @@ static void watch_switches(struct core *core)
     const bool driver = s->driver_seen;
 
     s->driver_seen = false;
+    if (driver)
+        drop_string_close(core); /* the interrupt has done so: it must be known, too */
     if ((s->inputs[BOARD_IN_DRIVER_FAULT] && fitted->driver_fault_fitted) || driver)
         safety_raise(core, LUMI_RIG_FAULT_DRIVER, "the motor driver reports a fault");
     if (!motion_moving(&core->motion) ||
@@ -229,9 +231,15 @@ static void watch_switches(struct core *core)
         safety_raise(core, LUMI_RIG_FAULT_STRING_END, "the string is paid out");
     if (s->inputs[BOARD_IN_SLACK] && fitted->slack_fitted && speed > 0)
         safety_raise(core, LUMI_RIG_FAULT_SLACK, "the string hangs loose");
-    if (s->inputs[BOARD_IN_WOUND] && fitted->wound_fitted && speed < 0 && !homing_active(&core->homing) &&
-        motion_position(&core->motion) < 0)
+    if (!s->inputs[BOARD_IN_WOUND] || !fitted->wound_fitted || speed >= 0 || homing_active(&core->homing))
+        return;
+    const double position = (double)motion_position(&core->motion);
+    if (position > core->steps_per_turn && !(s->standing & BIT(LUMI_RIG_FAULT_STRING_END))) {
+        motion_forget(&core->motion);
+        safety_raise(core, LUMI_RIG_FAULT_STRING_END, "the arm is all the way up, turns too early");
+    } else if (position < 0) {
         safety_raise(core, LUMI_RIG_FAULT_STRING_END, "the string is wound up, and was to be wound further");
+    }
 }
 
 static void watch_supply(struct core *core)

@@ -68,7 +68,7 @@ static void plan_way(struct core *core)
         sweep_plan_continuous(core);
 }
 
-/* The shots of this sweep, by what the host asked for. */
+/* The shots of this sweep, by what the host asked for: which is the first. */
 static const char *choose_shots(struct core *core, uint32_t first, bool only_missing)
 {
     struct sweep *s = &core->sweep;
@@ -85,15 +85,21 @@ static const char *choose_shots(struct core *core, uint32_t first, bool only_mis
     }
     if (first >= shots)
         return "there is no such shot in the plan";
-    if (!only_missing)
-        firing_plan_again(&core->firing, first, shots - first);
-    for (uint32_t i = first; i < shots; i++)
-        if (firing_state(&core->firing, i) == SHOT_LOST)
-            firing_plan_again(&core->firing, i, 1);
-    sweep_skip(core);
-    if (s->shot == s->end)
+    while (only_missing && s->shot < shots && firing_state(&core->firing, s->shot) == SHOT_FIRED)
+        s->shot++;
+    if (s->shot == shots)
         return "every shot has been fired";
     return NULL;
+}
+
+/* What is lost, or all of it, is planned again. Only once nothing refuses the sweep any more. */
+static void plan_shots(struct core *core, uint32_t first)
+{
+    const struct sweep *s = &core->sweep;
+
+    for (uint32_t i = first; i < s->end; i++)
+        if (!s->only_missing || firing_state(&core->firing, i) == SHOT_LOST)
+            firing_plan_again(&core->firing, i, 1);
 }
 
 static const char *check_wind(const struct core *core)
@@ -112,18 +118,18 @@ const char *sweep_begin(struct core *core, uint32_t first_shot, bool only_missin
 {
     struct sweep *s = &core->sweep;
     const int turns_done = s->turns_done;
-    const bool recording = s->recording;
     const char *why;
 
-    *s = (struct sweep){.turns_done = turns_done, .recording = recording, .wake = BOARD_NEVER, .exposure = -1};
+    *s = (struct sweep){.turns_done = turns_done, .wake = BOARD_NEVER, .exposure = -1};
     why = choose_shots(core, first_shot, only_missing);
     if (why)
         return why;
-    firing_begin(&core->firing, &core->rig, &core->plan);
     plan_way(core);
     why = check_wind(core);
     if (why)
         return why;
+    firing_begin(&core->firing, &core->rig, &core->plan);
+    plan_shots(core, first_shot);
     s->phase = SWEEP_WIND;
     s->full_wound = core->plan.wind != LUMI_PLAN_WIND_FULL || first_shot > 0 || only_missing;
     s->how = lumi_wire_SweepEnded_How_COMPLETE;
@@ -239,11 +245,8 @@ bool sweep_end_with_row(struct core *core)
 
 void sweep_cleared(struct core *core)
 {
-    struct sweep *s = &core->sweep;
-
-    if (!s->recording)
+    if (!firing_recording(&core->firing))
         return;
-    s->recording = false;
     firing_release(&core->firing);
     firing_record(&core->firing, &core->rig, core->plan.cameras, false,
                   core->board->now(core->board->port) + FIRING_MARGIN_TICKS);

@@ -38,7 +38,6 @@ struct sweep {
     bool stopping;   /* motion was told to stop */
     bool full_wound; /* wind full: the way up is behind us */
     bool external;
-    bool recording;      /* the cameras have had their start pulse, and no stop */
     uint32_t shot;       /* the next to be queued */
     uint32_t end;        /* one past the last */
     int64_t start;       /* step from which the sweep runs up */

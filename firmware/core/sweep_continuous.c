@@ -71,6 +71,8 @@ static void feed(struct core *core)
         const double position = sweep_position(core, s->shot);
         uint64_t middle = motion_time_of(&core->motion, position);
         if (middle == BOARD_NEVER) {
+            if (motion_halted(&core->motion))
+                return; /* an interrupt came since the faults were looked at: what has not begun stays planned */
             firing_lose(&core->firing, s->shot, 0, core->now, position);
             continue;
         }
@@ -155,14 +157,17 @@ static void poll_unrecord(struct core *core)
         return;
     }
     lamp_off(&core->lamp);
-    if (s->recording && core->firing.gate != GATE_OFF) {
-        s->recording = false;
-        firing_record(&core->firing, &core->rig, core->plan.cameras, false, core->now + RECORD_AHEAD);
-    }
-    if (!firing_busy_now(&core->firing))
-        sweep_done(core);
-    else
+    if (firing_busy_now(&core->firing)) {
         sweep_wake(core, core->now + RETRY_TICKS);
+        return;
+    }
+    if (core->safety.standing == 0)
+        firing_release(&core->firing); /* stopped at once by the host, and nothing to clear that would do it */
+    if (firing_recording(&core->firing) && core->firing.gate != GATE_OFF &&
+        firing_record(&core->firing, &core->rig, core->plan.cameras, false, core->now + RECORD_AHEAD))
+        sweep_wake(core, core->now + RETRY_TICKS);
+    else
+        sweep_done(core);
 }
 
 static void poll_record(struct core *core)
@@ -176,9 +181,8 @@ static void poll_record(struct core *core)
     }
     if (s->until == 0) {
         s->until = core->now + CORE_SECONDS(core->rig.control.video.record_lead) + RECORD_AHEAD;
-        if (!s->recording)
+        if (!firing_recording(&core->firing))
             firing_record(&core->firing, &core->rig, core->plan.cameras, true, core->now + RECORD_AHEAD);
-        s->recording = true;
     }
     if (core->now < s->until) {
         sweep_wake(core, s->until);

@@ -118,7 +118,10 @@ static void move(struct core *core)
     if (motion_position(&core->motion) != target) {
         if (!core_move(core, target, &limits, at))
             return;
-        s->ready_at = motion_end(&core->motion) + settle_ticks(core);
+        s->ready_at = motion_end(&core->motion);
+        if (s->ready_at == BOARD_NEVER)
+            return; /* halted by an interrupt just now */
+        s->ready_at += settle_ticks(core);
     } else {
         s->ready_at = at + settle_ticks(core);
     }
@@ -128,13 +131,16 @@ static void move(struct core *core)
         sweep_mark(core, core->now);
 }
 
-/* A shot of the position's bracket has begun or is done: the rest belongs to it. */
+/* A shot of the position's bracket has begun or is done: the rest belongs to it, and so does the way that is left to
+ * the position (a focus line may go up before it is reached). Not where the position is lost. */
 static bool bracket_begun(const struct core *core)
 {
     const struct sweep *s = &core->sweep;
 
-    return core->firing.gate == GATE_OPEN && !motion_moving(&core->motion) && s->shot > s->group_first &&
-           (firing_state(&core->firing, s->group_first) != SHOT_PLANNED || firing_begun(&core->firing));
+    if (core->firing.gate != GATE_OPEN || s->shot <= s->group_first || !motion_known(&core->motion))
+        return false;
+    return firing_begun(&core->firing, s->group_first) ||
+           (!motion_moving(&core->motion) && firing_state(&core->firing, s->group_first) != SHOT_PLANNED);
 }
 
 static void poll_shoot(struct core *core)

@@ -41,12 +41,13 @@ struct bench {
     int64_t position;
     bool inputs[BOARD_INPUTS], outputs[BOARD_OUTPUTS];
     int supply_mv;
-    int slip;               /* the platform turns so many steps a step; 0: one */
-    bool mark_hidden;       /* the index switch is broken */
-    uint64_t last_step;     /* tick */
-    uint64_t brake_at;      /* tick of its last change */
-    uint64_t *step_at;      /* of each step … */
-    int64_t *step_position; /* … and where it led */
+    void (*inside)(struct bench *b); /* an interrupt in the middle of a poll, once: behind the look at the inputs */
+    int slip;                        /* the platform turns so many steps a step; 0: one */
+    bool mark_hidden;                /* the index switch is broken */
+    uint64_t last_step;              /* tick */
+    uint64_t brake_at;               /* tick of its last change */
+    uint64_t *step_at;               /* of each step … */
+    int64_t *step_position;          /* … and where it led */
     int step_count;
     uint16_t lines;
     struct bench_edge *edges;
@@ -131,7 +132,13 @@ static bool bench_input(void *context, enum board_input input)
 
 static int bench_supply(void *context)
 {
-    return ((struct bench *)context)->supply_mv;
+    struct bench *b = context;
+    void (*inside)(struct bench *) = b->inside;
+
+    b->inside = NULL;
+    if (inside)
+        inside(b);
+    return b->supply_mv;
 }
 
 /* ---- The host ---- */

@@ -305,7 +305,7 @@ static void stopping_finishes_what_has_begun_and_plans_the_rest_again(void **sta
     for (uint32_t i = 0; i < 3; i++)
         assert_true(firing_shoot(&p.firing, i, 0, middle + i * 200 * MS, 0));
     run(&p, middle - 30 * MS); /* camera 1's line is up, camera 0's is not */
-    assert_true(firing_begun(&p.firing));
+    assert_true(firing_begun(&p.firing, 0));
     firing_stop(&p.firing, true);
     assert_false(firing_shoot(&p.firing, 5, 0, middle + 900 * MS, 0));
     run(&p, middle + 900 * MS);
@@ -397,6 +397,19 @@ static void recording_is_a_pulse_or_held(void **state)
     assert_int_equal(p.lines, 0);
 }
 
+static void an_exposure_of_a_minute_is_as_long(void **state)
+{
+    struct port p;
+
+    (void)state;
+    begin(&p, 1);
+    p.rig.control.triggers[0].busy = 60;
+    p.plan.exposures[0] = 60;
+    firing_begin(&p.firing, &p.rig, &p.plan);
+    assert_true(firing_half(&p.firing, 0) == 30000 * MS);
+    assert_true(firing_spacing(&p.firing, 0, 0, 0) == 120000 * (uint64_t)MS);
+}
+
 static void the_lamp_sends_its_number_twice_over(void **state)
 {
     struct port p;
@@ -445,6 +458,7 @@ int main(void)
         cmocka_unit_test(stopping_at_once_drops_all_lines_and_tells_what_was_lost),
         cmocka_unit_test(feedback_is_stamped_and_belongs_to_its_shot),
         cmocka_unit_test(recording_is_a_pulse_or_held),
+        cmocka_unit_test(an_exposure_of_a_minute_is_as_long),
         cmocka_unit_test(the_lamp_sends_its_number_twice_over),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
