@@ -83,7 +83,7 @@ struct dma {
 
 struct usart {
     uint32_t sr, dr, brr, cr1, cr2, cr3, gtpr;
-    bool sending, holding, sr_read, framing_error, line_idle;
+    bool sending, holding, sr_read, framing_error;
     uint8_t shift, hold;
     uint64_t sent, arrives, idle;
     uint8_t queue[4096];

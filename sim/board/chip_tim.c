@@ -348,9 +348,12 @@ static void write_register(struct f405 *chip, int index, uint32_t offset, uint32
 bool f405_timer_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     struct timer *t = &chip->timer[index];
-    if (offset == 0x50 && (wide(index) || index == 11)) /* OR: no remapping */
-        return write ? *value == 0 : (*value = 0, true);
-    if (offset > 0x48 || (offset >= 0x14 && !write && offset == 0x14 && (*value = 0, false)))
+    if (offset == 0x50) { /* OR: no remapping */
+        if (!write)
+            *value = 0;
+        return *value == 0;
+    }
+    if (offset > 0x48)
         return false;
     f405_timer_sync(chip, index, chip->now);
     if (!write) {

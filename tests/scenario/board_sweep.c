@@ -176,6 +176,7 @@ static void a_board_is_configured_homed_and_sweeps_over_its_serial_line(void **s
     assert_int_equal(status.state, lumi_wire_State_NO_PROFILE);
     assert_true(abs((int)status.supply_mv - 24000) < 200);
     assert_string_equal(board_client_wire(f.client)->welcome.board, "stm32f405");
+    f405_uart_break(f405_machine_chip(f.machine), 2); /* a byte is damaged on the line */
     BOARD_OK(board_client_configure(f.client, &f.rig, error));
     assert_int_equal(board_fixture_status(&f).state, lumi_wire_State_LOST);
     BOARD_OK(board_client_home(f.client, false, 0, error));
@@ -226,6 +227,10 @@ static void an_emergency_stop_ends_the_steps_at_once_and_the_sweep_goes_on_after
     BOARD_OK(board_client_run(f.client, 1, error));
     const struct f405_machine_edge *edge = f405_machine_steps(f.machine, &count);
     assert_true(edge[count - 1].at < pressed + F405_HZ / 100000); /* 10 us: less than a step */
+    const struct f405_exception_stats *estop = f405_stats(f405_machine_chip(f.machine), 16 + 6);
+    printf("emergency stop: taken after %llu cycles, %u instructions; last step %.3f us after the press\n",
+           (unsigned long long)estop->latency_max, estop->instructions_max,
+           ((double)edge[count - 1].at - (double)pressed) / 168);
     assert_true(has_fault(&f));
     assert_false(sim_mechanics_falling(mechanics));
     struct lumi_error refusal;
