@@ -471,7 +471,7 @@ void f405_reset_pin(struct f405 *chip)
 
 static void sleep_ahead(struct f405 *chip)
 {
-    if (f405_cpu_deliverable(chip) || chip->cpu.event) {
+    if (f405_cpu_wakes(chip) || chip->cpu.event) {
         chip->cpu.asleep = chip->cpu.event = false;
         return;
     }

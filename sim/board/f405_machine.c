@@ -135,8 +135,8 @@ static void outside_event(void *context, uint64_t now)
 {
     struct f405_machine *m = context;
     const struct sim_mechanics_listener listener = {m, drive_input, drive_feedback};
-    m->mechanics_next = 0;
     sim_mechanics_advance(m->mechanics, now / 2, &listener);
+    m->mechanics_next = 0; /* after it, too: whoever was told may have asked in between */
     if (usb_host_next(m->usb) <= now)
         usb_host_event(m->usb, now);
     if (m->cut_at <= now)
@@ -226,6 +226,7 @@ enum f405_stop f405_machine_run_to(struct f405_machine *m, uint64_t cycle)
                 stop = F405_STOP_TIME;
         }
     }
+    outside_event(m, f405_now(m->chip)); /* what the caller does to the mechanics now, it does at this time */
     return stop;
 }
 

@@ -231,6 +231,7 @@ static void an_emergency_stop_ends_the_steps_at_once_and_the_sweep_goes_on_after
     printf("emergency stop: taken after %llu cycles, %u instructions; last step %.3f us after the press\n",
            (unsigned long long)estop->latency_max, estop->instructions_max,
            ((double)edge[count - 1].at - (double)pressed) / 168);
+    assert_true(estop->latency_max < F405_HZ / 1000000);
     assert_true(has_fault(&f));
     assert_false(sim_mechanics_falling(mechanics));
     struct lumi_error refusal;
