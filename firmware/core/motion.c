@@ -96,7 +96,7 @@ void motion_release(struct motion *motion)
 /* Planning. */
 
 /* How far a parabola through a segment's ends strays from the curve, ticks: t(x) has the third derivative 3 a² / v⁵ −
- * j / v⁴, and s (s − n/2) (s − n) is at most n³ √3 / 36 in 0 … n. An estimate: single precision, which is hardware. */
+ * j / v⁴, and s (s − n/2) (s − n) is at most n³ √3 / 36 in 0 … n. An estimate: single precision is enough. */
 static float bend(const struct ramp_phase *at, float n)
 {
     float v = (float)at->v, w = n / v, aw = (float)at->a * w / v, jw = (float)at->j * w * w / v;
