@@ -104,6 +104,9 @@ void core_command_commit_profile(struct core *core, const lumi_wire_CommitProfil
         core_refuse(reply, lumi_wire_Result_BAD, "what has come is not the whole profile");
         return;
     }
+    /* While flash is erased no interrupt comes through, not even the emergency stop's: nothing may move by itself. */
+    if (core_external(core))
+        drop_string_cut(core);
     /* Decoded into the board's own profile, for want of room for two; whatever comes of it, the one in flash that
      * counts is loaded afterwards. */
     if (lumi_wire_decode_profile(core->store.data, core->uploaded, &core->store.message, &core->rig, &core->error) !=

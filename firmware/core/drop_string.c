@@ -92,6 +92,14 @@ void drop_string_release(struct core *core)
         set_enabled(core, false);
 }
 
+void drop_string_cut(struct core *core)
+{
+    set_brake(core, false);
+    core->string.enabled = false;
+    core->board->output(core->board->port, BOARD_OUT_ENABLE, false); /* the interrupt may have done so already */
+    motion_forget(&core->motion);
+}
+
 bool drop_string_set_enable(struct core *core, bool active)
 {
     if (!active && !drop_string_held(core))

@@ -36,6 +36,8 @@ void drop_string_close(struct core *core);
 void drop_string_release(struct core *core);
 /* Something else than the motor holds the arm: the brake, for long enough, or it hangs on no string. */
 bool drop_string_held(const struct core *core);
+/* An external drive stops itself where its enable line falls: now. The brake closes, the position is lost. */
+void drop_string_cut(struct core *core);
 /* The bench's direct hand: false where it would let the arm fall. */
 bool drop_string_set_enable(struct core *core, bool active);
 bool drop_string_set_brake(struct core *core, bool open);

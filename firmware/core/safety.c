@@ -97,10 +97,7 @@ static void halt(struct core *core, bool off)
     homing_cancel(&core->homing);
     motion_halt(&core->motion);
     if (core_external(core)) {
-        drop_string_close(core);
-        core->string.enabled = false;
-        core->board->output(core->board->port, BOARD_OUT_ENABLE, false);
-        motion_forget(&core->motion);
+        drop_string_cut(core);
     } else if (off) {
         drop_string_release(core);
         motion_forget(&core->motion);

@@ -155,6 +155,8 @@ static int check_safety(const struct lumi_rig *rig, struct lumi_error *error)
     if (s->overspeed > 0 && s->overspeed <= rig->control.motion.speed_max)
         RIG_REFUSE("safety: overspeed of %g rad/s is not above speed_max, %g", s->overspeed,
                    rig->control.motion.speed_max);
+    if (rig->control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL && !rig->string.held && !s->brake_fitted)
+        RIG_REFUSE("safety: an emergency stop lets go of an external drive: with no brake fitted the arm falls");
     for (int f = 0; f < LUMI_RIG_FAULTS; f++)
         LUMI_TRY(check_reaction(rig, f, error));
     return LUMI_OK;

@@ -36,7 +36,14 @@ static void choose(struct rig_operator *o, int seed)
         f->plan.bracket = 1 + seed % 2;
         f->plan.exposures[1] = 1.0 / 250;
     }
+    if (seed % 13 == 5) {
+        f->plan.mode = LUMI_PLAN_VIDEO;
+        f->plan.bracket = 1;
+        f->plan.turn_time = 10;
+        f->rig.control.video.record_pulse = seed % 2 ? 0.1 : 0;
+    }
     sim_machine_options_init(&f->options, &f->rig);
+    f->options.mechanics.video = f->plan.mode == LUMI_PLAN_VIDEO;
     f->options.seed = (uint64_t)seed;
     /* Main loops of 20 µs, 1 ms and 2 ms: only interrupts are on time. */
     f->options.loop_latency =
@@ -86,7 +93,10 @@ static bool one_day(int seed)
     if (!good) {
         sim_fault_script_print(&o->script, text, sizeof text);
         print_message("seed %d (%s, %s): %s\n%s", seed, o->f.rig.name,
-                      o->f.plan.mode == LUMI_PLAN_START_STOP ? "start-stop" : "continuous", o->why, text);
+                      o->f.plan.mode == LUMI_PLAN_VIDEO        ? "video"
+                      : o->f.plan.mode == LUMI_PLAN_START_STOP ? "start-stop"
+                                                               : "continuous",
+                      o->why, text);
     }
     sim_machine_destroy(o->f.machine);
     free(o);

@@ -72,7 +72,7 @@ static void act(struct rig_operator *o)
     } else {
         int from;
         sim_machine_events(m, &from);
-        if (first_missing(o) == o->shots) {
+        if (o->shots > 0 && first_missing(o) == o->shots) {
             o->complete = true; /* its end was told while nobody listened */
             return;
         }
@@ -353,6 +353,25 @@ static bool judge_states(struct rig_operator *o)
     return true;
 }
 
+/* After a video no camera records: one that did not hear its stop would until its card is full. Those whose board
+ * forgot, whose lines are dead or that are told wrong are excused. */
+static bool judge_recording(struct rig_operator *o)
+{
+    struct sim_machine *m = o->f.machine;
+    int starts, before, after;
+
+    sim_machine_start_ticks(m, &starts);
+    for (int i = 0; i < o->script.count; i++)
+        if (o->script.faults[i].kind == SIM_FAULT_CAMERA_DEAD)
+            return true;
+    if (!o->f.options.mechanics.video || starts > 1)
+        return true;
+    sim_mechanics_video(sim_machine_mechanics(m), &before);
+    sim_machine_run(m, 1);
+    sim_mechanics_video(sim_machine_mechanics(m), &after);
+    return before == after || wrong(o, "%d frames after the video's end", after - before);
+}
+
 bool rig_operator_judge(struct rig_operator *o)
 {
     struct sim_mechanics *m = sim_machine_mechanics(o->f.machine);
@@ -361,5 +380,5 @@ bool rig_operator_judge(struct rig_operator *o)
         return wrong(o, "the arm fell by %g degrees", sim_mechanics_fallen(m) / DEGREE);
     if (sim_machine_events_lost(o->f.machine) == 0 && (!judge_shots(o) || !judge_map(o) || !judge_states(o)))
         return false;
-    return judge_estop(o);
+    return judge_estop(o) && judge_recording(o);
 }

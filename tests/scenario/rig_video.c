@@ -120,6 +120,7 @@ static void thirty_two_rows_are_filmed_in_two_turns(void **state)
     (void)state;
     video("arc16x2", 30, 0.2);
     video("arc16x2", 60, 0.2);
+    video("arc16x2", 120, 0.2);
 }
 
 static void cameras_that_record_while_their_line_is_held_are_filmed_with_too(void **state)

@@ -46,8 +46,9 @@ struct bench {
     bool mark_hidden;                /* the index switch is broken */
     uint64_t last_step;              /* tick */
     uint64_t brake_at;               /* tick of its last change */
-    uint64_t *step_at;               /* of each step … */
-    int64_t *step_position;          /* … and where it led */
+    int enable_falls;
+    uint64_t *step_at;      /* of each step … */
+    int64_t *step_position; /* … and where it led */
     int step_count;
     uint16_t lines;
     struct bench_edge *edges;
@@ -118,6 +119,7 @@ static void bench_output(void *context, uint64_t at, enum board_output output, b
 {
     struct bench *b = context;
 
+    b->enable_falls += output == BOARD_OUT_ENABLE && b->outputs[output] && !active;
     b->outputs[output] = active;
     if (output == BOARD_OUT_BRAKE)
         b->brake_at = at;

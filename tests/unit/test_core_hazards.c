@@ -198,18 +198,11 @@ static void cameras_that_record_are_stopped_by_a_stop_at_once_too(void **state)
     bench_destroy(b);
 }
 
-static void no_profile_is_taken_while_a_record_pulse_is_up(void **state)
+/* Sends the bench's own profile once more; `commit` would take it. */
+static void upload(struct bench *b, lumi_wire_Request *commit)
 {
     static lumi_wire_Profile scratch;
     static uint8_t data[LUMI_WIRE_PROFILE_MAX];
-    struct lumi_plan plan;
-
-    (void)state;
-    struct bench *b = create("bar2", NULL);
-    filming(b, &plan);
-    start(b, &plan);
-    bench_until(b, lumi_wire_State_SWEEPING, 20);
-    bench_run(b, 5);
     size_t size = lumi_wire_encode_profile(&b->rig, &scratch, data, sizeof data), sent = 0;
     while (sent < size) {
         lumi_wire_Request request = {.which_command = lumi_wire_Request_write_profile_tag};
@@ -220,14 +213,28 @@ static void no_profile_is_taken_while_a_record_pulse_is_up(void **state)
         sent += write->data.size;
         assert_int_equal(bench_ask(b, &request), lumi_wire_Result_DONE);
     }
+    *commit = (lumi_wire_Request){.which_command = lumi_wire_Request_commit_profile_tag};
+    commit->command.commit_profile.size = (uint32_t)size;
+    commit->command.commit_profile.crc = lumi_crc32c(0, data, size);
+}
+
+static void no_profile_is_taken_while_a_record_pulse_is_up(void **state)
+{
+    struct lumi_plan plan;
+    lumi_wire_Request commit;
+
+    (void)state;
+    struct bench *b = create("bar2", NULL);
+    filming(b, &plan);
+    start(b, &plan);
+    bench_until(b, lumi_wire_State_SWEEPING, 20);
+    bench_run(b, 5);
+    upload(b, &commit);
     press(b);
     bench_run(b, 1);
     bench_set_input(b, BOARD_IN_ESTOP, false);
     bench_run(b, 0.1);
     assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_DONE);
-    lumi_wire_Request commit = {.which_command = lumi_wire_Request_commit_profile_tag};
-    commit.command.commit_profile.size = (uint32_t)size;
-    commit.command.commit_profile.crc = lumi_crc32c(0, data, size);
     assert_int_equal(bench_ask(b, &commit), lumi_wire_Result_REFUSED);
     bench_run(b, 1);
     assert_int_equal(b->edge_count, 4);
@@ -322,6 +329,64 @@ static void a_start_that_is_refused_forgets_no_shot(void **state)
     bench_destroy(b);
 }
 
+static void driven_from_outside(struct lumi_rig *rig)
+{
+    rig->control.motion.drive = LUMI_RIG_DRIVE_EXTERNAL;
+}
+
+static void an_external_drive_stands_while_flash_is_written(void **state)
+{
+    lumi_wire_Request commit;
+
+    (void)state;
+    struct bench *b = create("arc16", driven_from_outside);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(home, 0)), lumi_wire_Result_DONE);
+    bench_run(b, 0.5);
+    assert_true(b->outputs[BOARD_OUT_ENABLE]);
+    upload(b, &commit);
+    b->enable_falls = 0;
+    assert_int_equal(bench_ask(b, &commit), lumi_wire_Result_DONE);
+    assert_int_equal(b->enable_falls, 1);
+    assert_int_equal(b->core->state, lumi_wire_State_LOST);
+    bench_destroy(b);
+}
+
+static void an_external_drive_on_a_string_wants_a_brake(void **state)
+{
+    struct lumi_rig rig;
+    struct lumi_error error;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("bar2", &rig, NULL), LUMI_OK);
+    rig.control.motion.drive = LUMI_RIG_DRIVE_EXTERNAL;
+    rig.control.safety.brake_fitted = false;
+    assert_int_equal(lumi_rig_check(&rig, &error), LUMI_ERR_FORMAT);
+    assert_non_null(strstr(error.text, "no brake fitted the arm falls"));
+    rig.control.safety.brake_fitted = true;
+    assert_int_equal(lumi_rig_check(&rig, &error), LUMI_OK);
+}
+
+static void lines_fall_in_the_emergency_stops_interrupt(void **state)
+{
+    struct lumi_plan plan;
+
+    (void)state;
+    struct bench *b = create("arc16", NULL);
+    bench_home(b);
+    lumi_plan_init(&plan, &b->rig);
+    uint32_t crc = start(b, &plan);
+    bench_until(b, lumi_wire_State_SWEEPING, 30);
+    bench_run(b, 5);
+    while (b->lines == 0)
+        host_board_run(b->board, host_board_now(b->board) + BENCH_SECOND / 1000);
+    press(b);
+    assert_int_equal(b->lines, 0); /* no poll has come round yet */
+    bench_run(b, 1);
+    assert_int_equal(b->lost, 1);
+    recover(b, 1, crc, 72);
+    bench_destroy(b);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -335,6 +400,9 @@ int main(void)
         cmocka_unit_test(a_turn_that_was_told_wrong_does_not_tear_the_string),
         cmocka_unit_test(no_jog_goes_beyond_the_string),
         cmocka_unit_test(a_start_that_is_refused_forgets_no_shot),
+        cmocka_unit_test(an_external_drive_stands_while_flash_is_written),
+        cmocka_unit_test(an_external_drive_on_a_string_wants_a_brake),
+        cmocka_unit_test(lines_fall_in_the_emergency_stops_interrupt),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
