@@ -16,7 +16,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
 
     (void)argc;
     (void)argv;
-    LUMI_TRY(cli_rig_open(address, false, &link, error));
+    LUMI_TRY(cli_rig_open(address, &link, error));
     code = lumi_rig_bench_clear(link, &cleared, error);
     lumi_rig_link_close(link);
     LUMI_TRY(code);

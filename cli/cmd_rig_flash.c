@@ -32,7 +32,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     if (program)
         flash.program = program;
     if (!in_loader)
-        LUMI_TRY(cli_rig_open(address, false, &flash.link, error));
+        LUMI_TRY(cli_rig_open(address, &flash.link, error));
     code = lumi_rig_flash(&flash, error);
     lumi_rig_link_close(flash.link);
     LUMI_TRY(code);

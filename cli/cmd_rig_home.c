@@ -23,7 +23,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     (void)argv;
     if (!(seconds > 0 && seconds <= 86400))
         return lumi_fail(error, LUMI_ERR_ARG, "--timeout: 0 to 86400 seconds");
-    LUMI_TRY(cli_rig_open(address, false, &bench.link, error));
+    LUMI_TRY(cli_rig_open(address, &bench.link, error));
     cli_rig_catch_interrupts();
     code = lumi_rig_bench_home(&bench, wind_up, turn, seconds, error);
     lumi_rig_link_close(bench.link);

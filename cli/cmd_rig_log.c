@@ -3,6 +3,7 @@
 #include "daemon/rig/event_text.h"
 #include "proto/base/file.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,7 +34,7 @@ static int put(struct lumi_rig_link *link, const struct lumi_rig_notice *notice,
     if (file >= 0 || json) {
         lumi_rig_notice_json(notice, &clock, text, LUMI_RIG_EVENT_TEXT_MAX);
         strcat(text, "\n");
-        if (file >= 0 && lumi_write_all(file, text, strlen(text)))
+        if (file >= 0 && (lumi_write_all(file, text, strlen(text)) || (fdatasync(file) && errno != EINVAL)))
             return lumi_fail_errno(error, out, "write");
         if (json)
             fputs(text, stdout);
@@ -56,6 +57,7 @@ static int watch(struct lumi_rig_link *link, int file, struct lumi_error *error)
     int quiet = 0;
 
     LUMI_TRY(lumi_rig_bench_status(link, &status, error));
+    lumi_rig_link_take_charge(link, true);
     while (!cli_rig_interrupts(NULL) && (follow || ((int32_t)(next - status.events_next) < 0 && quiet < 20))) {
         bool any = lumi_rig_link_notice(link, 0.1, &notice);
         quiet = any ? 0 : quiet + 1;
@@ -65,6 +67,8 @@ static int watch(struct lumi_rig_link *link, int file, struct lumi_error *error)
         if (notice.kind == LUMI_RIG_NOTICE_EVENT)
             next = notice.event.number + 1;
         LUMI_TRY(put(link, &notice, snapshot.welcome.boot, file, error));
+        if (notice.kind == LUMI_RIG_NOTICE_EVENT)
+            lumi_rig_link_stored(link, &notice.event);
     }
     return LUMI_OK;
 }
@@ -76,7 +80,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
 
     (void)argc;
     (void)argv;
-    LUMI_TRY(cli_rig_open(address, false, &link, error));
+    LUMI_TRY(cli_rig_open(address, &link, error));
     cli_rig_catch_interrupts();
     if (out) {
         file = open(out, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0666);

@@ -24,7 +24,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     (void)argv;
     if (out)
         LUMI_TRY(lumi_file_check_place(out, error));
-    LUMI_TRY(cli_rig_open(address, true, &link, error));
+    LUMI_TRY(cli_rig_open(address, &link, error));
     code = lumi_rig_bench_read_profile(link, &rig, error);
     lumi_rig_link_close(link);
     LUMI_TRY(code);

@@ -3,8 +3,14 @@
 #include "cli/rig_link.h"
 
 static char *address;
+static gboolean replace_newer;
 
-static const GOptionEntry options[] = {CLI_RIG_LINK_OPTION(address), {0}};
+static const GOptionEntry options[] = {
+    CLI_RIG_LINK_OPTION(address),
+    {"replace-newer", 0, 0, G_OPTION_ARG_NONE, &replace_newer, "even where a newer firmware wrote the one on the board",
+     NULL},
+    {0},
+};
 
 static int run(int argc, char **argv, struct lumi_error *error)
 {
@@ -14,8 +20,8 @@ static int run(int argc, char **argv, struct lumi_error *error)
 
     (void)argc;
     LUMI_TRY(cli_read_rig(argv[0], &rig, error));
-    LUMI_TRY(cli_rig_open(address, false, &link, error));
-    code = lumi_rig_bench_write_profile(link, &rig, error);
+    LUMI_TRY(cli_rig_open(address, &link, error));
+    code = lumi_rig_bench_write_profile(link, &rig, replace_newer, error);
     lumi_rig_link_close(link);
     return code;
 }

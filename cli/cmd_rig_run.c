@@ -120,7 +120,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     (void)argc;
     LUMI_TRY(check_options(error));
     lumi_rig_sweep_run_init(&sweep);
-    LUMI_TRY(cli_rig_open(address, false, &sweep.link, error));
+    LUMI_TRY(cli_rig_open(address, &sweep.link, error));
     cli_rig_catch_interrupts();
     LUMI_GOTO(code, done, lumi_rig_bench_read_profile(sweep.link, &rig, error));
     LUMI_GOTO(code, done, cli_read_plan(argv[0], &rig, &plan, error));

@@ -146,7 +146,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
 
     (void)argc;
     (void)argv;
-    LUMI_TRY(cli_rig_open(address, true, &link, error));
+    LUMI_TRY(cli_rig_open(address, &link, error));
     code = lumi_rig_bench_status(link, &status, error);
     lumi_rig_link_snapshot(link, &snapshot);
     if (code == LUMI_OK && json)

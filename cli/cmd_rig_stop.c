@@ -20,7 +20,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     (void)argv;
     if (now && emergency)
         return lumi_fail(error, LUMI_ERR_ARG, "either --now or --emergency");
-    LUMI_TRY(cli_rig_open(address, false, &bench.link, error));
+    LUMI_TRY(cli_rig_open(address, &bench.link, error));
     code =
         emergency ? lumi_rig_bench_emergency_stop(bench.link, 5, error) : lumi_rig_bench_stop(&bench, now, 300, error);
     lumi_rig_link_close(bench.link);

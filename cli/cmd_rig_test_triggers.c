@@ -35,7 +35,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     uint32_t cameras;
     int code;
 
-    LUMI_TRY(cli_rig_open(address, false, &bench.link, error));
+    LUMI_TRY(cli_rig_open(address, &bench.link, error));
     cli_rig_catch_interrupts();
     LUMI_GOTO(code, done, lumi_rig_bench_read_profile(bench.link, &rig, error));
     LUMI_GOTO(code, done, find_cameras(&rig, argc, argv, &cameras, error));

@@ -8,9 +8,9 @@
 
 #define OPEN_SECONDS 5.0
 
-int cli_rig_open(const char *address, bool observer, struct lumi_rig_link **link, struct lumi_error *error)
+int cli_rig_open(const char *address, struct lumi_rig_link **link, struct lumi_error *error)
 {
-    return lumi_rig_bench_open(address, observer, OPEN_SECONDS, link, error);
+    return lumi_rig_bench_open(address, OPEN_SECONDS, link, error);
 }
 
 static volatile sig_atomic_t interrupts;

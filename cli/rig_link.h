@@ -15,8 +15,8 @@
         "json", 0, 0, G_OPTION_ARG_NONE, &(variable), "one JSON object on standard output", NULL                       \
     }
 
-/* Waits some seconds for the board. `observer`: only looks. */
-int cli_rig_open(const char *address, bool observer, struct lumi_rig_link **link, struct lumi_error *error);
+/* Waits some seconds for the board. The link only looks (bench.h). */
+int cli_rig_open(const char *address, struct lumi_rig_link **link, struct lumi_error *error);
 /* From here on Ctrl-C is counted; cli_rig_interrupts says how often. */
 void cli_rig_catch_interrupts(void);
 int cli_rig_interrupts(void *context);

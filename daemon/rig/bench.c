@@ -11,6 +11,7 @@
 #define ANSWER_SECONDS 10.0 /* of the board, a reconnection included */
 #define FLASH_SECONDS 20.0  /* it erases a sector */
 #define ASK_NS 250000000u   /* between two looks at its state */
+#define TELL_NS 3000000000u /* for all the events that it keeps */
 #define USB_BOARDS 8
 
 /* ---- opening ---- */
@@ -36,14 +37,13 @@ static int explain_usb(struct lumi_error *error)
     return lumi_fail(error, LUMI_ERR_ARG, "%d boards on USB, say which with --link: %s", count, text->str);
 }
 
-int lumi_rig_bench_open(const char *address, bool observer, double seconds, struct lumi_rig_link **link,
-                        struct lumi_error *error)
+int lumi_rig_bench_open(const char *address, double seconds, struct lumi_rig_link **link, struct lumi_error *error)
 {
     struct lumi_rig_link_options options;
     int code;
 
     lumi_rig_link_options_init(&options);
-    options.observer = observer;
+    options.observer = options.holds = true;
     LUMI_TRY(lumi_rig_link_open(address ? address : "usb:", &options, link, error));
     code = lumi_rig_link_wait(*link, seconds, true, error);
     if (code == LUMI_OK)
@@ -158,7 +158,8 @@ done:
     return code;
 }
 
-static int write_whole(struct lumi_rig_link *link, const uint8_t *data, size_t size, struct lumi_error *error)
+static int write_whole(struct lumi_rig_link *link, const uint8_t *data, size_t size, bool replace_newer,
+                       struct lumi_error *error)
 {
     lumi_wire_Request request = {.which_command = lumi_wire_Request_write_profile_tag};
     lumi_wire_WriteProfile *part = &request.command.write_profile;
@@ -173,10 +174,12 @@ static int write_whole(struct lumi_rig_link *link, const uint8_t *data, size_t s
     request.which_command = lumi_wire_Request_commit_profile_tag;
     request.command.commit_profile.size = (uint32_t)size;
     request.command.commit_profile.crc = lumi_crc32c(0, data, size);
+    request.command.commit_profile.replace_newer = replace_newer;
     return lumi_rig_link_command(link, &request, FLASH_SECONDS, NULL, error);
 }
 
-int lumi_rig_bench_write_profile(struct lumi_rig_link *link, const struct lumi_rig *rig, struct lumi_error *error)
+int lumi_rig_bench_write_profile(struct lumi_rig_link *link, const struct lumi_rig *rig, bool replace_newer,
+                                 struct lumi_error *error)
 {
     uint8_t *data = lumi_alloc(2, LUMI_WIRE_PROFILE_MAX);
     lumi_wire_Profile *scratch = lumi_alloc(1, sizeof *scratch);
@@ -193,7 +196,7 @@ int lumi_rig_bench_write_profile(struct lumi_rig_link *link, const struct lumi_r
         code = lumi_fail(error, LUMI_ERR_FORMAT, "rig %s does not fit a message", rig->name);
         goto done;
     }
-    LUMI_GOTO(code, done, write_whole(link, data, size, error));
+    LUMI_GOTO(code, done, write_whole(link, data, size, replace_newer, error));
     LUMI_GOTO(code, done, read_whole(link, data + LUMI_WIRE_PROFILE_MAX, &back, error));
     if (back != size || memcmp(data, data + LUMI_WIRE_PROFILE_MAX, size))
         code = lumi_fail(error, LUMI_ERR_CHECKSUM, "what the board reads back is another profile");
@@ -274,14 +277,25 @@ static int await_rest(const struct lumi_rig_bench *bench, struct heard *heard, d
         }
         hear(bench->link, heard, 0.05);
     }
-    /* What it said of it is on its way. */
-    for (int i = 0; i < 20 && (int32_t)(heard->next - status->events_next) < 0; i++)
-        hear(bench->link, heard, 0.1);
     if (heard->restarted)
         return lumi_fail(error, LUMI_ERR_IO, "the board started again in between");
     if (stopped)
         return lumi_fail(error, LUMI_ERR_CANCELLED, "stopped");
     return LUMI_OK;
+}
+
+/* Why it ended as it did stands among the board's events. They are only read: they may belong to a sweep's log. */
+static void listen_back(struct lumi_rig_link *link, struct heard *heard, const lumi_wire_Status *status)
+{
+    uint64_t deadline = lumi_rig_link_now() + TELL_NS;
+
+    if ((int32_t)(heard->next - status->events_next) >= 0)
+        return;
+    lumi_rig_link_take_charge(link, true);
+    do
+        hear(link, heard, 0.1);
+    while ((int32_t)(heard->next - status->events_next) < 0 && lumi_rig_link_now() < deadline);
+    lumi_rig_link_take_charge(link, false);
 }
 
 static int act(const struct lumi_rig_bench *bench, const lumi_wire_Request *request, double seconds,
@@ -292,7 +306,10 @@ static int act(const struct lumi_rig_bench *bench, const lumi_wire_Request *requ
     hear(bench->link, heard, 0);
     heard->restarted = false;
     LUMI_TRY(lumi_rig_link_command(bench->link, request, ANSWER_SECONDS, NULL, error));
-    return await_rest(bench, heard, seconds, status, error);
+    LUMI_TRY(await_rest(bench, heard, seconds, status, error));
+    if (status->faults || !status->position_known)
+        listen_back(bench->link, heard, status);
+    return LUMI_OK;
 }
 
 static int judge_faults(const struct heard *heard, const lumi_wire_Status *status, const char *what,
@@ -388,6 +405,7 @@ int lumi_rig_bench_clear(struct lumi_rig_link *link, uint32_t *cleared, struct l
     if (!status.faults)
         return LUMI_OK;
     request.command.clear.faults = status.faults;
+    lumi_rig_link_take_charge(link, true); /* a heartbeat is what ends host-lost */
     LUMI_TRY(lumi_rig_link_command(link, &request, ANSWER_SECONDS, NULL, error));
     *cleared = status.faults;
     return LUMI_OK;

@@ -17,15 +17,16 @@ struct lumi_rig_bench {
     void (*progress)(void *context, const lumi_wire_Status *status);
 };
 
-/* Opens a link and waits for its session. `address` NULL: the one board on USB. `observer`: only looks. */
-int lumi_rig_bench_open(const char *address, bool observer, double seconds, struct lumi_rig_link **link,
-                        struct lumi_error *error);
+/* Opens a link and waits for its session. `address` NULL: the one board on USB. The link only looks and acknowledges
+ * nothing by itself (link.h: observer, holds), so that bench work takes no event away from a sweep's log. */
+int lumi_rig_bench_open(const char *address, double seconds, struct lumi_rig_link **link, struct lumi_error *error);
 
 int lumi_rig_bench_status(struct lumi_rig_link *link, lumi_wire_Status *status, struct lumi_error *error);
 /* LUMI_ERR_NOTFOUND: the board has none. */
 int lumi_rig_bench_read_profile(struct lumi_rig_link *link, struct lumi_rig *rig, struct lumi_error *error);
-/* Checks it, writes it, reads it back. */
-int lumi_rig_bench_write_profile(struct lumi_rig_link *link, const struct lumi_rig *rig, struct lumi_error *error);
+/* Checks it, writes it, reads it back. `replace_newer`: even over one of a newer firmware's format. */
+int lumi_rig_bench_write_profile(struct lumi_rig_link *link, const struct lumi_rig *rig, bool replace_newer,
+                                 struct lumi_error *error);
 
 /* LUMI_ERR_BUSY where the board refuses, LUMI_ERR_IO where it tried and failed, LUMI_ERR_CANCELLED after an interrupt;
  * with the board's reason. `seconds`: for all of it. */

@@ -41,8 +41,9 @@ struct lumi_rig_drive_sweep {
     const struct lumi_rig *rig;
     const struct lumi_plan *plan; /* loaded on the board already */
     uint32_t first_shot;          /* begins with the position of this one */
-    bool home;                    /* the drive homes first */
-    bool reset;                   /* an alarm that the drive still has from before is reset */
+    const uint8_t *states; /* of every shot, 1: fired; positions with nothing else are passed by. NULL: none is */
+    bool home;             /* the drive homes first */
+    bool reset;            /* an alarm that the drive still has from before is reset */
     void *context;
     /* Every event of the board on the way (shots, faults). May be NULL. */
     void (*notice)(void *context, const struct lumi_rig_notice *notice);

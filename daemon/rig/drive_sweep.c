@@ -223,6 +223,16 @@ static int fire(struct watch *watch, int position, struct lumi_error *error)
     return LUMI_OK;
 }
 
+static bool is_done(const struct lumi_rig_drive_sweep *sweep, int position)
+{
+    const int bracket = sweep->plan->bracket;
+
+    for (int i = 0; i < bracket; i++)
+        if (!sweep->states || sweep->states[position * bracket + i] != 1)
+            return false;
+    return true;
+}
+
 static int check(struct lumi_rig_drive_sweep *sweep, struct lumi_error *error)
 {
     struct lumi_rig_link_snapshot snapshot;
@@ -258,6 +268,8 @@ int lumi_rig_drive_sweep(struct lumi_rig_drive_sweep *sweep, struct lumi_error *
     LUMI_GOTO(code, done, tell_place(&watch, error));
     for (int position = first; position < plan->positions * plan->turns; position++) {
         double turns = plan->first_turn + (double)position / plan->positions;
+        if (is_done(sweep, position))
+            continue;
         if (sweep->cancelled && sweep->cancelled(sweep->context)) {
             code = lumi_fail(error, LUMI_ERR_CANCELLED, "stopped before position %d", position);
             goto done;

@@ -97,6 +97,7 @@ int lumi_rig_link_open_stream(struct lumi_rig_stream *stream, const struct lumi_
     lumi_wire_client_init(&link->client, &lumi_rig_link_client_ops, link,
                           link->options.host ? link->options.host : random_host());
     link->client.observer = link->options.observer;
+    link->client.holds = link->options.holds;
     LUMI_GOTO(code, fail, make_pipe(link, error));
     if (start_thread(link)) {
         code = lumi_fail(error, LUMI_ERR_IO, "%s: no thread could be started", stream->name);
@@ -251,6 +252,25 @@ bool lumi_rig_link_emergency_stop(struct lumi_rig_link *link)
     lumi_rig_link_wake(link);
     pthread_mutex_unlock(&link->mutex);
     return sent;
+}
+
+void lumi_rig_link_take_charge(struct lumi_rig_link *link, bool charge)
+{
+    pthread_mutex_lock(&link->mutex);
+    if (link->options.observer && link->client.observer == charge)
+        lumi_wire_client_take_charge(&link->client, charge, lumi_rig_link_now());
+    lumi_rig_link_wake(link);
+    pthread_mutex_unlock(&link->mutex);
+}
+
+void lumi_rig_link_stored(struct lumi_rig_link *link, const lumi_wire_Event *event)
+{
+    pthread_mutex_lock(&link->mutex);
+    if (link->client.holds) {
+        lumi_wire_client_stored(&link->client, event->boot, event->number, lumi_rig_link_now());
+        lumi_rig_link_wake(link);
+    }
+    pthread_mutex_unlock(&link->mutex);
 }
 
 bool lumi_rig_link_notice(struct lumi_rig_link *link, double seconds, struct lumi_rig_notice *notice)

@@ -26,7 +26,8 @@ enum lumi_rig_link_state {
 
 struct lumi_rig_link_options {
     uint64_t host;   /* the client's number, not 0; 0 takes a random one */
-    bool observer;   /* takes no events from whoever is in charge, and keeps no sweep alive */
+    bool observer;   /* takes no events from whoever is in charge, and keeps no sweep alive; see take_charge */
+    bool holds;      /* events are acknowledged when lumi_rig_link_stored names them, not when they have come */
     double patience; /* s without a word from the board before a session counts as silent (2) */
     /* Called in the link's thread when notices have come, for a main loop that wants waking; must not call the link. */
     void (*wake)(void *context);
@@ -77,6 +78,11 @@ struct lumi_rig_notice {
     lumi_wire_Event event;
     char text[256];
 };
+/* With options.observer: becomes the host in charge, to whom events go, from the oldest that the board keeps; or only
+ * looks again. */
+void lumi_rig_link_take_charge(struct lumi_rig_link *link, bool charge);
+/* With options.holds: this event and those before it need no longer be kept by the board. */
+void lumi_rig_link_stored(struct lumi_rig_link *link, const lumi_wire_Event *event);
 /* The next notice. Waits at most so many seconds (0: not at all); false: there is none. */
 bool lumi_rig_link_notice(struct lumi_rig_link *link, double seconds, struct lumi_rig_notice *notice);
 

@@ -379,6 +379,11 @@ void *lumi_rig_link_thread(void *context)
             break;
         wait_for_something(link);
     }
+    if (link->open && link->client.acknowledge) { /* what was stored last */
+        link->client.acknowledge_due_ns = 0;
+        lumi_wire_client_poll(&link->client, lumi_rig_link_now());
+        transmit(link);
+    }
     if (link->in_flight)
         finish(link, link->in_flight, lumi_fail(link->in_flight->error, LUMI_ERR_CANCELLED, "the link was closed"));
     link->in_flight = NULL;

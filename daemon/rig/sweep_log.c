@@ -107,6 +107,7 @@ static int append(struct lumi_rig_sweep_log *log, char *line, size_t size, struc
     if (log->fd < 0)
         return LUMI_OK;
     line[size++] = '\n';
+    log->fresh = false;
     if (lumi_write_all(log->fd, line, size) || fdatasync(log->fd))
         return lumi_fail_errno(error, log->path, "write");
     return LUMI_OK;
@@ -128,6 +129,7 @@ int lumi_rig_sweep_log_open(struct lumi_rig_sweep_log *log, const char *path, bo
                             const struct lumi_rig *rig, struct lumi_error *error)
 {
     bool old = path && resume && access(path, F_OK) == 0;
+    int code;
 
     memset(log, 0, sizeof *log);
     log->fd = -1;
@@ -143,7 +145,13 @@ int lumi_rig_sweep_log_open(struct lumi_rig_sweep_log *log, const char *path, bo
         return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already (--resume goes on with it)", path);
     if (log->fd < 0)
         return lumi_fail_errno(error, path, "open");
-    return old ? LUMI_OK : begin(log, plan, rig, error);
+    if (old)
+        return LUMI_OK;
+    code = begin(log, plan, rig, error);
+    log->fresh = true;
+    if (code != LUMI_OK)
+        lumi_rig_sweep_log_close(log, NULL);
+    return code;
 }
 
 int lumi_rig_sweep_log_close(struct lumi_rig_sweep_log *log, struct lumi_error *error)
@@ -151,6 +159,8 @@ int lumi_rig_sweep_log_close(struct lumi_rig_sweep_log *log, struct lumi_error *
     int fd = log->fd;
 
     log->fd = -1;
+    if (fd >= 0 && log->fresh)
+        unlink(log->path);
     return fd >= 0 && close(fd) ? lumi_fail_errno(error, log->path, "close") : LUMI_OK;
 }
 

@@ -8,7 +8,8 @@
 #include "proto/mechanism/sweep_plan.h"
 
 struct lumi_rig_sweep_log {
-    int fd; /* −1: nothing is kept */
+    int fd;     /* −1: nothing is kept */
+    bool fresh; /* made now, and nothing in it but its first line */
     char path[1024];
     /* What it held when it was opened. */
     uint32_t boot, event; /* of the last event in it */
@@ -20,6 +21,7 @@ struct lumi_rig_sweep_log {
  * goes on: LUMI_ERR_FORMAT where it is of another plan, or no such log. */
 int lumi_rig_sweep_log_open(struct lumi_rig_sweep_log *log, const char *path, bool resume, const struct lumi_plan *plan,
                             const struct lumi_rig *rig, struct lumi_error *error);
+/* A log in which nothing came to stand goes again: its sweep never began. */
 int lumi_rig_sweep_log_close(struct lumi_rig_sweep_log *log, struct lumi_error *error);
 /* Leaves out what is in it already. */
 int lumi_rig_sweep_log_notice(struct lumi_rig_sweep_log *log, const struct lumi_rig_notice *notice,

@@ -1,7 +1,7 @@
 /* Running a sweep from the host.
  *
  * 1. Which shots are done is the board's to say (ReadShots); events only add when and where. After a restart of the
- *    board its memory of them is gone: then the log says where to go on.
+ *    board its memory of them is gone: then the log tells it (MarkShots).
  * 2. The end is an event, but also a state: where the event was lost, a board that rests has ended. */
 #include "daemon/rig/sweep_run.h"
 #include "daemon/rig/link_priv.h"
@@ -13,7 +13,7 @@
 
 #define ANSWER_SECONDS 10.0
 #define REST_NS 1500000000u /* at rest for so long without a word of the end: it has ended */
-#define LATE_SECONDS 3.0    /* for events that are on their way when it has ended */
+#define LATE_NS 3000000000u /* for the next of the events that are on their way when it has ended */
 
 struct course {
     struct lumi_rig_sweep_run *run;
@@ -26,6 +26,7 @@ struct course {
     uint64_t begun_ns, heard_ns, rest_ns;
     char reason[256]; /* the last fault or note */
     struct lumi_error log_error;
+    uint8_t states[LUMI_PLAN_SHOTS_MAX]; /* of the shots, when it begins and when it has ended */
 };
 
 void lumi_rig_sweep_run_init(struct lumi_rig_sweep_run *run)
@@ -136,8 +137,11 @@ static void take(struct course *course, const struct lumi_rig_notice *notice)
     if (notice->kind != LUMI_RIG_NOTICE_EVENT || course->run->resume ||
         (int32_t)(notice->event.number - course->first_event) >= 0)
         write_down(course, notice);
-    if (notice->kind == LUMI_RIG_NOTICE_EVENT)
-        take_event(course, &notice->event);
+    if (notice->kind != LUMI_RIG_NOTICE_EVENT)
+        return;
+    if (!course->log_error.code)
+        lumi_rig_link_stored(course->run->link, &notice->event);
+    take_event(course, &notice->event);
 }
 
 static void listen(struct course *course, double seconds)
@@ -161,12 +165,43 @@ static int load(struct course *course, struct lumi_error *error)
     return lumi_rig_link_command(course->run->link, &request, ANSWER_SECONDS, NULL, error);
 }
 
-static int mark_all(struct course *course, struct lumi_error *error)
+static int mark(struct course *course, uint32_t first, uint32_t count, bool fired, struct lumi_error *error)
 {
     lumi_wire_Request request = {.which_command = lumi_wire_Request_mark_shots_tag};
 
-    request.command.mark_shots.count = course->run->shots;
+    request.command.mark_shots = (lumi_wire_MarkShots){.first = first, .count = count, .fired = fired};
     return lumi_rig_link_command(course->run->link, &request, ANSWER_SECONDS, NULL, error);
+}
+
+/* The board has started again since the log's last event, and knows nothing of what was fired before. */
+static int remind(struct course *course, struct lumi_error *error)
+{
+    struct lumi_rig_sweep_run *run = course->run;
+
+    if (!run->log || !run->log->any || run->log->boot == course->boot)
+        return LUMI_OK;
+    for (uint32_t first = 0, count; first < run->shots; first += count + 1) {
+        for (count = 0; first + count < run->shots && course->states[first + count] != 1 &&
+                        lumi_rig_sweep_log_has(run->log, first + count);
+             count++)
+            course->states[first + count] = 1;
+        if (count)
+            LUMI_TRY(mark(course, first, count, true, error));
+    }
+    return LUMI_OK;
+}
+
+/* What is to be taken: everything, or what is missing. */
+static int find_missing(struct course *course, struct lumi_error *error)
+{
+    struct lumi_rig_sweep_run *run = course->run;
+
+    if (!run->shots)
+        return LUMI_OK;
+    if (!run->resume)
+        return mark(course, 0, run->shots, false, error);
+    LUMI_TRY(lumi_rig_read_shots(run->link, run->shots, course->states, error));
+    return remind(course, error);
 }
 
 static int start(struct course *course, uint32_t first, struct lumi_error *error)
@@ -179,36 +214,22 @@ static int start(struct course *course, uint32_t first, struct lumi_error *error
     return lumi_rig_link_command(course->run->link, &request, ANSWER_SECONDS, NULL, error);
 }
 
-/* Where to go on, and whether the board is at it already. */
-static int find_beginning(struct course *course, const lumi_wire_Status *status, uint32_t *first, bool *running,
-                          struct lumi_error *error)
+/* Whether this sweep may begin, and whether the board is at it already. */
+static int may_begin(struct course *course, const lumi_wire_Status *status, bool *running, struct lumi_error *error)
 {
     struct lumi_rig_sweep_run *run = course->run;
     bool ours = status->plan_crc == lumi_wire_plan_crc(run->plan);
-    uint8_t states[LUMI_PLAN_SHOTS_MAX];
 
     *running = !lumi_rig_state_at_rest(status->state);
-    *first = 0;
     if (*running && !(ours && run->resume))
         return lumi_fail(error, LUMI_ERR_BUSY, "the board is %s%s", lumi_wire_state_name(status->state),
                          ours ? " this plan: run --resume joins it" : "");
-    if (*running || !run->shots)
-        return LUMI_OK;
-    if (ours && !run->resume && !run->again && status->shots_fired && status->shots_fired < run->shots)
+    if (!*running && ours && !run->resume && !run->again && status->shots_fired && status->shots_fired < run->shots)
         return lumi_fail(
             error, LUMI_ERR_EXISTS,
             "the board holds this sweep with %u of %u shots fired: --resume takes what is missing, --again "
             "everything anew",
             (unsigned)status->shots_fired, (unsigned)run->shots);
-    if (!run->resume)
-        return LUMI_OK;
-    if (ours) {
-        LUMI_TRY(lumi_rig_read_shots(run->link, run->shots, states, error));
-        *first = first_missing(states, run->shots);
-    } else if (run->log) {
-        while (*first < run->shots && lumi_rig_sweep_log_has(run->log, *first))
-            ++*first;
-    }
     return LUMI_OK;
 }
 
@@ -224,19 +245,21 @@ static int begin(struct course *course, struct lumi_error *error)
     lumi_rig_link_snapshot(run->link, &snapshot);
     course->boot = snapshot.welcome.boot;
     course->first_event = status.events_next;
-    LUMI_TRY(find_beginning(course, &status, &first, &running, error));
-    if (run->shots && first == run->shots) {
-        run->ended = true;
-        return LUMI_OK;
-    }
-    if (running) { /* its end may be among what the board has kept */
+    course->next_event = snapshot.welcome.events_first;
+    LUMI_TRY(may_begin(course, &status, &running, error));
+    lumi_rig_link_take_charge(run->link, true); /* not before it is clear that its events are ours to take */
+    if (running) {                              /* its end may be among what the board has kept */
         course->first_event = 0;
         course->begun = true;
         return LUMI_OK;
     }
     LUMI_TRY(load(course, error));
-    if (!run->resume && run->shots)
-        LUMI_TRY(mark_all(course, error));
+    LUMI_TRY(find_missing(course, error));
+    first = first_missing(course->states, run->shots);
+    if (run->shots && first == run->shots) {
+        run->ended = true;
+        return LUMI_OK;
+    }
     course->begun = true;
     if (!run->drive)
         return start(course, first, error);
@@ -353,6 +376,7 @@ static int drive_it(struct course *course, struct lumi_error *error)
                                          .rig = run->rig,
                                          .plan = run->plan,
                                          .first_shot = run->fired,
+                                         .states = course->states,
                                          .home = run->home_drive,
                                          .reset = run->reset_drive,
                                          .context = course,
@@ -372,17 +396,28 @@ static int drive_it(struct course *course, struct lumi_error *error)
 
 /* ---- the end ---- */
 
+/* Those that are on their way, be the line ever so slow. */
+static void await_events(struct course *course, uint32_t next)
+{
+    uint64_t until = lumi_rig_link_now() + LATE_NS;
+
+    while ((int32_t)(course->next_event - next) < 0 && lumi_rig_link_now() < until) {
+        uint32_t before = course->next_event;
+        listen(course, 0.1);
+        if (course->next_event != before)
+            until = lumi_rig_link_now() + LATE_NS;
+    }
+}
+
 static int account(struct course *course, struct lumi_error *error)
 {
     struct lumi_rig_sweep_run *run = course->run;
-    uint8_t states[LUMI_PLAN_SHOTS_MAX];
+    uint8_t *states = course->states;
     lumi_wire_Status status;
     char missing[200];
 
     LUMI_TRY(lumi_rig_bench_status(run->link, &status, error));
-    for (uint64_t until = lumi_rig_link_now() + (uint64_t)(LATE_SECONDS * 1e9);
-         (int32_t)(course->next_event - status.events_next) < 0 && lumi_rig_link_now() < until;)
-        listen(course, 0.1);
+    await_events(course, status.events_next);
     LUMI_TRY(lumi_rig_read_shots(run->link, run->shots, states, error));
     run->fired = run->lost = 0;
     for (uint32_t shot = 0; shot < run->shots; shot++) {
@@ -390,8 +425,6 @@ static int account(struct course *course, struct lumi_error *error)
         run->lost += states[shot] == 2;
         if (run->log && states[shot] == 1 && !lumi_rig_sweep_log_has(run->log, shot))
             LUMI_TRY(lumi_rig_sweep_log_shot(run->log, shot, course->boot, error));
-        if (run->log && states[shot] == 0 && lumi_rig_sweep_log_has(run->log, shot))
-            states[shot] = 1; /* before the board started anew */
     }
     run->missing = 0;
     for (uint32_t shot = 0; shot < run->shots; shot++)

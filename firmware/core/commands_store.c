@@ -113,7 +113,8 @@ void core_command_commit_profile(struct core *core, const lumi_wire_CommitProfil
             LUMI_OK ||
         lumi_rig_check(&core->rig, &core->error) != LUMI_OK)
         refuse_with_error(core, lumi_wire_Result_BAD, reply);
-    else if (profile_store_save(core->board, core->store.data, core->uploaded, false, &core->error) != LUMI_OK)
+    else if (profile_store_save(core->board, core->store.data, core->uploaded, commit->replace_newer, &core->error) !=
+             LUMI_OK)
         refuse_with_error(core, lumi_wire_Result_FAILED, reply);
     core_load_profile(core);
 }
@@ -148,5 +149,5 @@ void core_command_mark_shots(struct core *core, const lumi_wire_MarkShots *mark,
         core_refuse(reply, lumi_wire_Result_BAD, "no such shots in the plan");
         return;
     }
-    firing_plan_again(&core->firing, mark->first, mark->count);
+    firing_mark(&core->firing, mark->first, mark->count, mark->fired ? SHOT_FIRED : SHOT_PLANNED);
 }

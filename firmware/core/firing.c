@@ -77,10 +77,15 @@ static void set_state(struct firing *firing, uint32_t number, enum shot_state st
     firing->states[number / 4] = (uint8_t)((firing->states[number / 4] & ~(3u << shift)) | (unsigned)state << shift);
 }
 
-void firing_plan_again(struct firing *firing, uint32_t first, uint32_t count)
+void firing_mark(struct firing *firing, uint32_t first, uint32_t count, enum shot_state state)
 {
     for (uint32_t i = 0; i < count && first + i < LUMI_PLAN_SHOTS_MAX; i++)
-        set_state(firing, first + i, SHOT_PLANNED);
+        set_state(firing, first + i, state);
+}
+
+void firing_plan_again(struct firing *firing, uint32_t first, uint32_t count)
+{
+    firing_mark(firing, first, count, SHOT_PLANNED);
 }
 
 uint32_t firing_next_planned(struct firing *firing)

@@ -51,6 +51,8 @@ void firing_init(struct firing *firing, const struct board *board, struct firing
 void firing_begin(struct firing *firing, const struct lumi_rig *rig, const struct lumi_plan *plan);
 /* Shots first .. first + count − 1 are PLANNED. */
 void firing_plan_again(struct firing *firing, uint32_t first, uint32_t count);
+/* What the host knows better than the board. */
+void firing_mark(struct firing *firing, uint32_t first, uint32_t count, enum shot_state state);
 
 /* Wants shot `number`, the middle of its exposures at `middle` (ticks). False: too early to take (queue full), ask
  * again; a time that is too near or past, or a busy camera, marks it lost, reports it and returns true. */

@@ -63,11 +63,12 @@ static void send_heartbeat(struct lumi_wire_client *client, bool quiet, uint64_t
 {
     lumi_wire_HostFrame out = {.which_body = lumi_wire_HostFrame_heartbeat_tag};
 
-    out.body.heartbeat = (lumi_wire_Heartbeat){.token = client->welcome.token,
-                                               .host_time = now_ns,
-                                               .events_next = client->events_next,
-                                               .observer = client->observer,
-                                               .quiet = quiet};
+    out.body.heartbeat =
+        (lumi_wire_Heartbeat){.token = client->welcome.token,
+                              .host_time = now_ns,
+                              .events_next = client->holds ? client->events_stored : client->events_next,
+                              .observer = client->observer,
+                              .quiet = quiet};
     bool sent = send_message(client, &out);
     if (!quiet)
         client->heartbeat_due_ns = due(sent, now_ns, LUMI_WIRE_HEARTBEAT_NS);
@@ -205,7 +206,7 @@ static void on_welcome(struct lumi_wire_client *client, const lumi_wire_Welcome 
     uint32_t number = client->number;
 
     if (restarted || !client->welcomed) {
-        client->events_next = restarted ? 0 : welcome->events_first;
+        client->events_next = client->events_stored = restarted ? 0 : welcome->events_first;
         memset(client->early_kept, 0, sizeof client->early_kept);
     }
     if (lost)
@@ -287,16 +288,38 @@ static void skip_to(struct lumi_wire_client *client, uint32_t oldest)
         client->ops->events_lost(client->context, missing);
 }
 
+static void acknowledge_soon(struct lumi_wire_client *client, uint64_t now_ns)
+{
+    if (client->acknowledge)
+        return;
+    client->acknowledge = true;
+    client->acknowledge_due_ns = now_ns + LUMI_WIRE_ACKNOWLEDGE_NS;
+}
+
+void lumi_wire_client_stored(struct lumi_wire_client *client, uint32_t boot, uint32_t number, uint64_t now_ns)
+{
+    if (!client->welcomed || boot != client->welcome.boot || (int32_t)(number + 1 - client->events_stored) <= 0)
+        return;
+    client->events_stored = number + 1;
+    acknowledge_soon(client, now_ns);
+}
+
+void lumi_wire_client_take_charge(struct lumi_wire_client *client, bool charge, uint64_t now_ns)
+{
+    client->observer = !charge;
+    if (client->state == LUMI_WIRE_CLIENT_OPEN)
+        send_heartbeat(client, false, now_ns);
+}
+
 static void on_event(struct lumi_wire_client *client, lumi_wire_Event *event, uint64_t now_ns)
 {
     int32_t kept = (int32_t)(event->number - event->oldest);
 
     if (client->observer || client->state != LUMI_WIRE_CLIENT_OPEN || event->boot != client->welcome.boot || kept < 0)
         return;
-    if (!client->acknowledge) {
-        client->acknowledge = true;
-        client->acknowledge_due_ns = now_ns + LUMI_WIRE_ACKNOWLEDGE_NS;
-    }
+    /* One that was stored comes again: the board has not been told. */
+    if (!client->holds || (int32_t)(event->number - client->events_stored) < 0)
+        acknowledge_soon(client, now_ns);
     if ((int32_t)(event->oldest - client->events_next) > 0)
         skip_to(client, event->oldest);
     int32_t ahead = (int32_t)(event->number - client->events_next);

@@ -7,7 +7,8 @@
  *    in it. Another token means that the board restarted or forgot us: what was in flight is reported lost.
  * 3. An event is handed on if it is the next one. What the board no longer keeps is counted and reported before the
  *    next event; what came before is dropped; what comes too early waits, if it is less than LUMI_WIRE_EARLY before its
- *    time, and comes again otherwise.
+ *    time, and comes again otherwise. What was handed on is acknowledged at once, or, with `holds`, when it is said to
+ *    be stored: what is not, the board keeps for the next host.
  * 4. Callbacks come from receive only, and may call everything but receive. */
 #ifndef LUMI_PROTO_WIRE_CLIENT_H
 #define LUMI_PROTO_WIRE_CLIENT_H
@@ -53,6 +54,7 @@ struct lumi_wire_client {
     void *context;
     enum lumi_wire_client_state state;
     bool observer; /* set after init: takes no events, keeps no sweep alive */
+    bool holds;    /* set after init: acknowledges only what lumi_wire_client_stored has named */
     uint32_t version_min, version_max;
     uint64_t host;
     bool welcomed; /* there has been a session: `welcome` is of the last one */
@@ -61,8 +63,9 @@ struct lumi_wire_client {
     uint32_t number; /* of the last request */
     bool in_flight;
     uint32_t events_next;
-    bool acknowledge;    /* an event has come that is not acknowledged yet, nor said to have come again */
-    uint64_t pulse_time; /* host_time of the last pulse handed on */
+    uint32_t events_stored; /* acknowledged up to here, where it holds */
+    bool acknowledge;       /* an event has come that is not acknowledged yet, nor said to have come again */
+    uint64_t pulse_time;    /* host_time of the last pulse handed on */
     bool pulsed;
     uint32_t stop_nonce, stops_left; /* an emergency stop that waits for its confirmation; 0: none */
     uint64_t request_due_ns, heartbeat_due_ns, acknowledge_due_ns, hello_due_ns, stop_due_ns;
@@ -86,6 +89,10 @@ int lumi_wire_client_request(struct lumi_wire_client *client, lumi_wire_Request 
 void lumi_wire_client_receive(struct lumi_wire_client *client, const uint8_t *data, size_t size, uint64_t now_ns);
 /* Sends what is due. */
 void lumi_wire_client_poll(struct lumi_wire_client *client, uint64_t now_ns);
+/* With `holds`: this event and all before it are stored. One of an earlier start of the board does nothing. */
+void lumi_wire_client_stored(struct lumi_wire_client *client, uint32_t boot, uint32_t number, uint64_t now_ns);
+/* From now on as a host in charge (true), or as one that only looks. */
+void lumi_wire_client_take_charge(struct lumi_wire_client *client, bool charge, uint64_t now_ns);
 /* When something is due next; UINT64_MAX: never. */
 uint64_t lumi_wire_client_next_poll(const struct lumi_wire_client *client);
 /* The stream was closed and opened again: the rest of a frame is dropped, the session is asked for at once, and what is

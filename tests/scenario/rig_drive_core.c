@@ -144,7 +144,8 @@ static void start(struct lumi_rig_sweep_run *run)
     lumi_rig_sweep_run_init(run);
     snprintf(address, sizeof address, "fd:%d", ends[0]);
     assert_int_equal(lumi_rig_link_open(address, NULL, &run->link, &error), LUMI_OK);
-    if (lumi_rig_link_wait(run->link, 20, false, &error) || lumi_rig_bench_write_profile(run->link, &rig, &error))
+    if (lumi_rig_link_wait(run->link, 20, false, &error) ||
+        lumi_rig_bench_write_profile(run->link, &rig, false, &error))
         fail_msg("%s", error.text);
     lumi_plan_init(&plan, &rig);
     plan.mode = LUMI_PLAN_START_STOP;
@@ -216,6 +217,16 @@ static void an_emergency_stop_takes_the_drives_power_and_the_rest_is_taken_later
     assert_int_equal(run.missing, 0);
     assert_int_equal(run.fired, POSITIONS);
     assert_int_equal(fired_at[fired - 1], 500 - 36000 / POSITIONS * (POSITIONS - 1));
+
+    /* A hole in the middle, and nothing that follows it. */
+    lumi_wire_Request mark = {.which_command = lumi_wire_Request_mark_shots_tag};
+    int before = fired;
+    mark.command.mark_shots = (lumi_wire_MarkShots){.first = 1, .count = 1};
+    assert_int_equal(lumi_rig_link_command(run.link, &mark, 10, NULL, &error), LUMI_OK);
+    if (lumi_rig_sweep_run(&run, &error))
+        fail_msg("%s", error.text);
+    assert_int_equal(fired, before + 1);
+    assert_int_equal(fired_at[before], 500 - 36000 / POSITIONS);
     finish(&run);
 }
 

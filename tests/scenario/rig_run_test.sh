@@ -87,6 +87,7 @@ fired=$(shots_in log)
 [ "$fired" -ge 10 ] && [ "$fired" -lt 72 ] || fail "$fired shots after a pause"
 expect_line 3 "is there already" rig run plan --log log
 expect_line 3 "--resume takes what is missing" rig run plan --log other
+[ ! -e other ] || fail "a sweep that never began left a log"
 
 # On with it, until somebody presses the switch.
 "$lumi" rig run -l "$board" plan --resume --log log >printed 2>&1 &
@@ -119,8 +120,12 @@ echo "cut 1" >&7
 sleep 0.5
 expect_line 1 "nothing answers" rig status
 echo "cut 0" >&7
+# What is done meanwhile takes nothing from the log.
+rig clear >/dev/null || fail "clear with nothing to clear"
+rig "profile get" >/dev/null || fail "profile get"
 rig run plan --resume --log log >printed 2>&1 || fail "the sweep was not completed: $(cat printed)"
 each_once log 72
+grep -q '"event_lost"' log && fail "events were lost: $(grep event_lost log)"
 
 # The board restarts in the middle of another sweep: what the log has is not taken again.
 printf '[sweep]\nname = second\nturn_time_s = 100\n' >second
@@ -132,8 +137,9 @@ wait $runner
 [ $? -eq 1 ] || fail "a restart ended with another status: $(cat printed)"
 grep -q "started again" printed || fail "no word of the restart: $(cat printed)"
 rig home || fail "home after a restart"
+grep -v -e '"shot":2,' -e '"shot":5,' log2 >holes && mv holes log2 # as if two had been lost
 rig run second --resume --log log2 --json >printed 2>&1 || fail "not completed after a restart: $(cat printed)"
-grep -q '"missing":0,"complete":true' printed || fail "$(cat printed)"
+grep -q '"fired":72,"lost":0,"missing":0,"complete":true' printed || fail "$(cat printed)"
 each_once log2 72
 
 # Stopped by hand; an emergency stop by the link.

@@ -45,6 +45,48 @@ static void with_the_position_lost_only_homing_moves(void **state)
     bench_destroy(b);
 }
 
+static void upload(struct bench *b, const uint8_t *data, size_t size)
+{
+    lumi_wire_Request write = {.which_command = lumi_wire_Request_write_profile_tag};
+
+    for (size_t at = 0; at < size; at += 256) {
+        size_t part = size - at < 256 ? size - at : 256;
+        write.command.write_profile.offset = (uint32_t)at;
+        write.command.write_profile.data.size = (pb_size_t)part;
+        memcpy(write.command.write_profile.data.bytes, data + at, part);
+        assert_int_equal(bench_ask(b, &write), lumi_wire_Result_DONE);
+    }
+}
+
+static void a_newer_firmware_s_profile_is_replaced_only_when_that_is_said(void **state)
+{
+    static lumi_wire_Profile scratch;
+    uint32_t newer[9] = {0x50524c4c, 2, 9, 4, 0, UINT32_MAX, UINT32_MAX, UINT32_MAX, 0x12345678};
+    uint8_t data[LUMI_WIRE_PROFILE_MAX];
+    struct lumi_rig rig;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("bar2", &rig, NULL), LUMI_OK);
+    struct bench *b = bench_create(NULL);
+    const struct board *port = host_board_port(b->board);
+    newer[4] = lumi_crc32c(lumi_crc32c(0, &newer[1], 12), &newer[8], 4);
+    assert_true(port->flash_erase(port->port, 1));
+    assert_true(port->flash_write(port->port, 1, 0, (const uint8_t *)newer, sizeof newer));
+    size_t size = lumi_wire_encode_profile(&rig, &scratch, data, sizeof data);
+    uint32_t crc = lumi_crc32c(0, data, size);
+    upload(b, data, size);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(commit_profile, .size = (uint32_t)size, .crc = crc)),
+                     lumi_wire_Result_FAILED);
+    assert_non_null(strstr(b->reply.text, "a newer firmware"));
+    assert_int_equal(b->core->state, lumi_wire_State_NO_PROFILE);
+    upload(b, data, size);
+    assert_int_equal(
+        bench_ask(b, BENCH_REQUEST(commit_profile, .size = (uint32_t)size, .crc = crc, .replace_newer = true)),
+        lumi_wire_Result_DONE);
+    assert_string_equal(b->core->rig.name, "bar2");
+    bench_destroy(b);
+}
+
 static void a_profile_is_taken_whole_or_not_at_all(void **state)
 {
     struct lumi_rig rig;
@@ -57,13 +99,7 @@ static void a_profile_is_taken_whole_or_not_at_all(void **state)
     struct bench *b = bench_create(NULL);
     size_t size = lumi_wire_encode_profile(&rig, &scratch, data, sizeof data);
     uint32_t crc = lumi_crc32c(0, data, size);
-    for (size_t at = 0; at < size; at += 256) {
-        size_t part = size - at < 256 ? size - at : 256;
-        write.command.write_profile.offset = (uint32_t)at;
-        write.command.write_profile.data.size = (pb_size_t)part;
-        memcpy(write.command.write_profile.data.bytes, data + at, part);
-        assert_int_equal(bench_ask(b, &write), lumi_wire_Result_DONE);
-    }
+    upload(b, data, size);
     assert_int_equal(bench_ask(b, BENCH_REQUEST(commit_profile, .size = (uint32_t)size, .crc = crc + 1)),
                      lumi_wire_Result_BAD);
     assert_int_equal(b->core->state, lumi_wire_State_NO_PROFILE);
@@ -151,6 +187,7 @@ int main(void)
         cmocka_unit_test(a_board_without_profile_answers_and_moves_nothing),
         cmocka_unit_test(with_the_position_lost_only_homing_moves),
         cmocka_unit_test(a_profile_is_taken_whole_or_not_at_all),
+        cmocka_unit_test(a_newer_firmware_s_profile_is_replaced_only_when_that_is_said),
         cmocka_unit_test(a_plan_that_cannot_be_or_another_one_is_refused),
         cmocka_unit_test(triggers_are_tested_one_after_another),
     };

@@ -197,6 +197,30 @@ static void marked_shots_are_taken_once_more_and_no_others(void **state)
     bench_destroy(b);
 }
 
+static void shots_marked_as_fired_are_not_taken_again(void **state)
+{
+    struct bench *b = homed("arc16", 1);
+    struct lumi_plan plan;
+
+    (void)state;
+    lumi_plan_init(&plan, &b->rig);
+    uint32_t crc = bench_load(b, &plan);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(mark_shots, .first = 0, .count = 30, .fired = true)),
+                     lumi_wire_Result_DONE);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(mark_shots, .first = 40, .count = 32, .fired = true)),
+                     lumi_wire_Result_DONE);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(mark_shots, .first = 40, .count = 33, .fired = true)),
+                     lumi_wire_Result_BAD);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(start_sweep, .plan_crc = crc, .first_shot = 0, .only_missing = true)),
+                     lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 60);
+    for (int i = 0; i < 72; i++)
+        assert_int_equal(b->shot_fired[i], i >= 30 && i < 40);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(get_status, 0)), lumi_wire_Result_DONE);
+    assert_int_equal(b->reply.payload.status.shots_fired, 72);
+    bench_destroy(b);
+}
+
 static void a_lost_host_ends_the_row_and_the_sweep_goes_on_later(void **state)
 {
     struct bench *b = homed("bar2", 1);
@@ -267,6 +291,7 @@ int main(void)
         cmocka_unit_test(a_start_stop_sweep_takes_brackets_standing_still),
         cmocka_unit_test(a_paused_sweep_goes_on_and_every_shot_is_fired_once),
         cmocka_unit_test(marked_shots_are_taken_once_more_and_no_others),
+        cmocka_unit_test(shots_marked_as_fired_are_not_taken_again),
         cmocka_unit_test(a_lost_host_ends_the_row_and_the_sweep_goes_on_later),
         cmocka_unit_test(a_video_records_and_flashes_every_turn),
     };

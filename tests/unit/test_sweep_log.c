@@ -165,6 +165,22 @@ static void other_files_are_not_gone_on_with(void **state)
     assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_ERR_FORMAT);
 }
 
+static void a_log_in_which_nothing_came_to_stand_goes_again(void **state)
+{
+    struct lumi_rig_sweep_log log;
+    struct lumi_error error = {0};
+
+    (void)state;
+    unlink(path);
+    assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_OK);
+    assert_int_equal(lumi_rig_sweep_log_close(&log, &error), LUMI_OK);
+    assert_int_equal(access(path, F_OK), -1);
+    write_log(1);
+    assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_OK);
+    assert_int_equal(lumi_rig_sweep_log_close(&log, &error), LUMI_OK);
+    assert_int_equal(access(path, F_OK), 0);
+}
+
 static void missing_shots_are_named_as_ranges(void **state)
 {
     uint8_t states[300];
@@ -211,6 +227,7 @@ int main(void)
         cmocka_unit_test(what_is_written_is_known_when_it_is_opened_again),
         cmocka_unit_test(a_torn_line_is_dropped),
         cmocka_unit_test(other_files_are_not_gone_on_with),
+        cmocka_unit_test(a_log_in_which_nothing_came_to_stand_goes_again),
         cmocka_unit_test(missing_shots_are_named_as_ranges),
     };
 

@@ -191,6 +191,38 @@ static void who_only_looks_takes_no_events_and_keeps_no_sweep_alive(void **state
     assert_int_equal(host.events, 5);
 }
 
+static void who_holds_acknowledges_what_is_stored_and_the_next_host_gets_the_rest(void **state)
+{
+    static struct pair_host next;
+    uint32_t boot = host.client.welcome.boot;
+
+    (void)state;
+    host.client.holds = true;
+    a_burst_of_events(3);
+    pair_run(&host, &board, 0, 10 * PAIR_MS, 600 * PAIR_MS); /* heartbeats and all */
+    assert_int_equal(host.events, 3);
+    assert_false(host.client.acknowledge);
+    assert_int_equal(board.server.events.first, 0);
+    lumi_wire_client_stored(&host.client, boot + 1, 2, 600 * PAIR_MS); /* of another start */
+    assert_false(host.client.acknowledge);
+    lumi_wire_client_stored(&host.client, boot, 1, 600 * PAIR_MS);
+    lumi_wire_client_stored(&host.client, boot, 0, 600 * PAIR_MS); /* said late: takes nothing back */
+    lumi_wire_client_poll(&host.client, 650 * PAIR_MS);
+    pair_carry(&host, &board, 0, 650 * PAIR_MS);
+    assert_int_equal(board.server.events.first, 2);
+
+    pair_host_start(&next, 0x5678);
+    next.client.observer = true;
+    lumi_wire_client_poll(&next.client, 700 * PAIR_MS);
+    pair_carry(&next, &board, 0, 700 * PAIR_MS);
+    assert_int_equal(next.events, 0);
+    lumi_wire_client_take_charge(&next.client, true, 701 * PAIR_MS);
+    pair_carry(&next, &board, 0, 701 * PAIR_MS);
+    assert_int_equal(next.events, 1);
+    assert_int_equal(next.event.number, 2);
+    assert_int_equal(next.events_lost, 0);
+}
+
 static void acknowledgements_are_quiet(void **state)
 {
     int pulses;
@@ -359,6 +391,7 @@ int main(void)
         OPEN(an_event_that_is_lost_on_the_line_comes_again_and_those_after_it_wait),
         OPEN(a_new_host_begins_with_what_is_kept),
         OPEN(who_only_looks_takes_no_events_and_keeps_no_sweep_alive),
+        OPEN(who_holds_acknowledges_what_is_stored_and_the_next_host_gets_the_rest),
         OPEN(acknowledgements_are_quiet),
         OPEN(answers_go_before_events),
         OPEN(a_silent_host_is_sent_nothing_more),
