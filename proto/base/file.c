@@ -153,11 +153,28 @@ static int fail_folder(const char *path, struct lumi_error *error)
     return code;
 }
 
+/* A device or a pipe is not to be put aside for a file of its name. */
+static bool is_special(const char *path)
+{
+    struct stat status;
+
+    return stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+}
+
+static int fail_special(const char *path, struct lumi_error *error)
+{
+    return lumi_fail(error, LUMI_ERR_ARG, "%s: is a device or a pipe; the name of a file is wanted", path);
+}
+
 int lumi_new_file_open(struct lumi_new_file *file, const char *path, struct lumi_error *error)
 {
     size_t length = strlen(path) + 48;
     int code;
 
+    if (is_special(path)) {
+        *file = (struct lumi_new_file){.fd = -1};
+        return fail_special(path, error);
+    }
     *file = (struct lumi_new_file){.fd = -1, .path = lumi_alloc(length, 1), .temporary = lumi_alloc(length, 1)};
     if (!file->path || !file->temporary) {
         code = lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory to write it", path);
@@ -220,6 +237,8 @@ int lumi_file_check_place(const char *path, struct lumi_error *error)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory", path);
     if (stat(path, &status) == 0 && S_ISDIR(status.st_mode))
         code = lumi_fail(error, LUMI_ERR_ARG, "%s: is a folder; the name of a file is wanted", path);
+    else if (is_special(path))
+        code = fail_special(path, error);
     else if (stat(folder, &status) || !S_ISDIR(status.st_mode))
         code = fail_folder(path, error);
     else if (access(folder, W_OK))

@@ -19,6 +19,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -295,10 +296,30 @@ static void what_a_killed_writer_left_goes_with_the_next_of_that_name(void **sta
     assert_int_equal(unlink(path) | unlink(other) | rmdir(folder), 0);
 }
 
+static void a_device_is_not_replaced_by_a_file(void **state)
+{
+    struct lumi_error error = {0};
+    struct stat status;
+    char name[] = "/tmp/lumi-base-XXXXXX", pipe[64];
+
+    (void)state;
+    assert_non_null(mkdtemp(name));
+    snprintf(pipe, sizeof pipe, "%s/pipe", name);
+    assert_int_equal(mkfifo(pipe, 0600), 0);
+    assert_int_equal(lumi_file_check_place(pipe, &error), LUMI_ERR_ARG);
+    assert_int_equal(lumi_file_write(pipe, "whole", 5, false, &error), LUMI_ERR_ARG);
+    assert_non_null(strstr(error.text, "a device or a pipe"));
+    assert_int_equal(stat(pipe, &status), 0);
+    assert_true(S_ISFIFO(status.st_mode));
+    unlink(pipe);
+    rmdir(name);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_error_is_one_line_whatever_the_name_in_it),
+        cmocka_unit_test(a_device_is_not_replaced_by_a_file),
         cmocka_unit_test(what_a_killed_writer_left_goes_with_the_next_of_that_name),
         cmocka_unit_test(crc32c_gives_the_published_check_value),
         cmocka_unit_test(a_reader_past_its_end_gives_zeros_and_stays_failed),

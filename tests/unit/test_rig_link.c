@@ -334,6 +334,48 @@ static void events_come_once_and_in_order_over_broken_connections(void **state)
     fake_board_stop(&board);
 }
 
+/* How many events come over a link that holds; the first `stored` are said to be stored. */
+static int events_of_one_who_holds(int stored, bool charge)
+{
+    struct lumi_rig_link_options options;
+    struct lumi_rig_link *link;
+    struct lumi_rig_notice notice;
+    struct lumi_error error = {0};
+    int count = 0;
+
+    lumi_rig_link_options_init(&options);
+    options.observer = options.holds = true;
+    assert_int_equal(lumi_rig_link_open(board.address, &options, &link, &error), LUMI_OK);
+    assert_int_equal(lumi_rig_link_wait(link, 20, false, &error), LUMI_OK);
+    lumi_rig_link_take_charge(link, charge);
+    while (lumi_rig_link_notice(link, charge && count < EVENTS / 2 - stored ? 20 : 0.3, &notice)) {
+        if (notice.kind == LUMI_RIG_NOTICE_EVENT && ++count <= stored)
+            lumi_rig_link_stored(link, &notice.event);
+        if (count == EVENTS / 2 - stored)
+            break;
+    }
+    lumi_rig_link_close(link);
+    return count;
+}
+
+static void events_stay_on_the_board_until_they_are_stored(void **state)
+{
+    lumi_wire_Event event = {.which_kind = lumi_wire_Event_turn_mark_tag};
+
+    (void)state;
+    start("pty");
+    for (int i = 0; i < EVENTS / 2; i++)
+        fake_board_event(&board, &event);
+    assert_int_equal(events_of_one_who_holds(0, false), 0);
+    assert_int_equal(events_of_one_who_holds(0, true), EVENTS / 2);
+    assert_int_equal(events_of_one_who_holds(EVENTS / 4, true), EVENTS / 4);
+    pthread_mutex_lock(&board.lock);
+    uint32_t kept = board.server.events.next - board.server.events.first;
+    pthread_mutex_unlock(&board.lock);
+    assert_int_equal(kept, EVENTS / 4);
+    fake_board_stop(&board);
+}
+
 static void the_clock_of_the_board_is_matched(void **state)
 {
     struct lumi_rig_link_snapshot snapshot;
@@ -461,6 +503,7 @@ int main(void)
         cmocka_unit_test(nobody_at_the_other_end_is_said),
         cmocka_unit_test(a_board_of_another_version_is_refused_with_both_ranges),
         cmocka_unit_test(events_come_once_and_in_order_over_broken_connections),
+        cmocka_unit_test(events_stay_on_the_board_until_they_are_stored),
         cmocka_unit_test(the_clock_of_the_board_is_matched),
         cmocka_unit_test(an_emergency_stop_needs_no_session_and_is_confirmed),
         cmocka_unit_test(many_threads_share_a_link),
