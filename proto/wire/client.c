@@ -298,7 +298,8 @@ static void acknowledge_soon(struct lumi_wire_client *client, uint64_t now_ns)
 
 void lumi_wire_client_stored(struct lumi_wire_client *client, uint32_t boot, uint32_t number, uint64_t now_ns)
 {
-    if (!client->welcomed || boot != client->welcome.boot || (int32_t)(number + 1 - client->events_stored) <= 0)
+    if (!client->welcomed || boot != client->welcome.boot || (int32_t)(number + 1 - client->events_stored) <= 0 ||
+        (int32_t)(number + 1 - client->events_next) > 0)
         return;
     client->events_stored = number + 1;
     acknowledge_soon(client, now_ns);

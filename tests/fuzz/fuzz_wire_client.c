@@ -166,6 +166,13 @@ static void run(const struct record *record)
     case 7:
         lumi_wire_client_emergency_stop(&host.client, host.now_ns);
         break;
+    case 8:
+        lumi_wire_client_stored(&host.client, host.client.welcome.boot + (record->argument & 1),
+                                host.client.events_next - 1 + (uint32_t)record_number(record) % 16, host.now_ns);
+        break;
+    case 9:
+        lumi_wire_client_take_charge(&host.client, record->argument & 1, host.now_ns);
+        break;
     default:
         ask(record);
         break;
@@ -181,12 +188,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memset(&host, 0, sizeof host);
     lumi_wire_client_init(&host.client, &ops, &host, 1);
     host.client.observer = size > 0 && data[size - 1] == 0xff;
+    host.client.holds = size > 1 && data[size - 2] & 1;
     lumi_wire_deframer_init(&host.out);
     while (script_next(&script, &record)) {
         run(&record);
         lumi_wire_client_poll(&host.client, host.now_ns);
         demand(lumi_wire_client_next_poll(&host.client) > host.now_ns);
         demand(host.waiting == host.client.in_flight && host.event_next == host.client.events_next);
+        demand((int32_t)(host.client.events_next - host.client.events_stored) >= 0);
         if (lumi_wire_client_version(&host.client, &error) != LUMI_OK)
             demand(error.text[0] != 0 && !strchr(error.text, '\n'));
     }

@@ -1,5 +1,7 @@
 /* docs/rig-wire.md says what the code does: its worked example, byte for byte, and its tables. */
 #include "proto/base/bytes.h"
+#include "proto/mechanism/rig.h"
+#include "proto/mechanism/sweep_plan.h"
 #include "proto/wire/client.h"
 #include "proto/wire/server.h"
 #include "proto/wire/transport.h"
@@ -164,6 +166,22 @@ static void the_numbers_are_those_of_the_code(void **state)
     demand("keeps four hosts");
 }
 
+static void the_words_of_plan_and_profile_have_their_numbers(void **state)
+{
+    (void)state;
+    demand("| `Plan.mode` | %d continuous, %d start-stop, %d video |", LUMI_PLAN_CONTINUOUS, LUMI_PLAN_START_STOP,
+           LUMI_PLAN_VIDEO);
+    demand("| `Plan.wind` | %d plan, %d full, %d none |", LUMI_PLAN_WIND_PLAN, LUMI_PLAN_WIND_FULL,
+           LUMI_PLAN_WIND_NONE);
+    demand("| `String.run` | %d arc, %d straight |", LUMI_RIG_RUN_ARC, LUMI_RIG_RUN_STRAIGHT);
+    demand("| `Lens.model` | %d pinhole, %d fisheye |", LUMI_LENS_BROWN, LUMI_LENS_FISHEYE);
+    demand("| `Motion.drive` | %d stepper, %d external |", LUMI_RIG_DRIVE_STEPPER, LUMI_RIG_DRIVE_EXTERNAL);
+    demand("| `Reaction.motor` | %d row-end, %d ramp, %d halt, %d off |", LUMI_RIG_MOTOR_ROW_END, LUMI_RIG_MOTOR_RAMP,
+           LUMI_RIG_MOTOR_HALT, LUMI_RIG_MOTOR_OFF);
+    demand("| `Reaction.triggers` | %d triggers-finish, %d triggers-off |", LUMI_RIG_TRIGGERS_FINISH,
+           LUMI_RIG_TRIGGERS_OFF);
+}
+
 /* ---- a client written from the page alone: no nanopb, none of our framing, messages by hand ---- */
 
 static size_t page_frame(const uint8_t *payload, size_t size, uint8_t *frame)
@@ -318,6 +336,7 @@ int main(void)
         cmocka_unit_test(the_tables_have_every_result_state_and_fault),
         cmocka_unit_test(the_tables_have_every_command_and_event),
         cmocka_unit_test(the_numbers_are_those_of_the_code),
+        cmocka_unit_test(the_words_of_plan_and_profile_have_their_numbers),
         cmocka_unit_test(framing_by_the_page_is_ours_byte_for_byte),
         cmocka_unit_test(a_client_written_from_the_page_is_understood),
     };
