@@ -11,6 +11,7 @@
 #define FOREIGN_RETRY_NS (5ull * SECOND_NS) /* one that is somebody else's is left alone longer */
 #define FOREIGN_BYTES 2048                  /* so much without a single frame of ours is no noise */
 #define POLL_MAX_NS 500000000u
+#define LAST_MS 30 /* for the last frame to leave: a line that is closed drops what it has not sent */
 
 /* ---- notices ---- */
 
@@ -383,6 +384,7 @@ void *lumi_rig_link_thread(void *context)
         link->client.acknowledge_due_ns = 0;
         lumi_wire_client_poll(&link->client, lumi_rig_link_now());
         transmit(link);
+        poll(NULL, 0, LAST_MS);
     }
     if (link->in_flight)
         finish(link, link->in_flight, lumi_fail(link->in_flight->error, LUMI_ERR_CANCELLED, "the link was closed"));
