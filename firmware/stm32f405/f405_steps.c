@@ -8,7 +8,9 @@
  *    after it stops the timer without raising anything.
  * 4. The emergency stop has a priority of its own and may come between any two instructions here. It freezes the
  *    timer, notes whether a rise is still to be told to the core, and lets a pulse that is up fall by 3. Whatever
- *    it interrupts sets CEN only with interrupts off and only while `stopped` is false. */
+ *    it interrupts sets CEN only with interrupts off and only while `stopped` is false.
+ * 5. An interrupt that comes a whole period late has missed a pulse, and the position would be wrong from there on
+ *    without anybody knowing: that ends in panic. */
 #include "firmware/core/core.h"
 #include "firmware/stm32f405/cortex.h"
 #include "firmware/stm32f405/f405_registers.h"
@@ -159,7 +161,8 @@ void TIM2_Handler(void)
 {
     const uint32_t primask = irq_disable();
     const bool updated = TIM_SR(TIM) & TIM_SR_UIF;
-    const bool told = steps.stopped && !steps.untold;
+    const bool stopped = steps.stopped, told = stopped && !steps.untold;
+    const uint32_t now = TIM_CNT(TIM5_BASE);
     TIM_SR(TIM) = ~TIM_SR_UIF;
     steps.untold = false;
     irq_restore(primask);
@@ -168,6 +171,8 @@ void TIM2_Handler(void)
         return;
     const uint64_t at = steps.at;
     const uint32_t period = steps.period;
+    if (!stopped && (int32_t)(now - (uint32_t)at) >= (int32_t)(period ? period : PERIOD_LAST))
+        panic();
     if (steps.wait > 0) {
         steps.at = at + period;
         steps.wait -= period;

@@ -10,17 +10,18 @@
 
 #define SLICE (F405_HZ / 4000u) /* how long the machine runs before bytes are looked at */
 #define PATIENCE 10.0           /* s for a reply: an erase takes one */
+#define IN_SIZE 512             /* as daemon/rig asks: ended by a packet that is not full */
 
 struct board_client {
     struct f405_machine *machine;
     enum board_link link;
     struct lumi_wire_client wire;
-    bool silent, replied, lost;
+    bool silent, replied, lost, stalled;
     lumi_wire_Reply reply;
     GArray *events; /* lumi_wire_Event */
     uint32_t events_lost;
     struct usb_transfer in, out;
-    uint8_t received[LUMI_WIRE_USB_PACKET], sending[LUMI_WIRE_FRAME_MAX];
+    uint8_t received[IN_SIZE], sending[LUMI_WIRE_FRAME_MAX];
 };
 
 static uint64_t now_ns(const struct board_client *c)
@@ -95,6 +96,7 @@ static void listen(struct board_client *c);
 static void packet_came(struct usb_transfer *transfer, void *context)
 {
     struct board_client *c = context;
+    c->stalled = transfer->status == USB_STALLED; /* asked again by `step` */
     if (transfer->status != USB_DONE)
         return;
     if (!c->silent)
@@ -174,6 +176,8 @@ static int step(struct board_client *c, uint64_t end, struct lumi_error *error)
 {
     uint64_t next = f405_machine_now(c->machine) + SLICE;
     uint8_t data[256];
+    if (c->stalled)
+        listen(c);
     if (!c->silent)
         lumi_wire_client_poll(&c->wire, now_ns(c));
     enum f405_stop stop = f405_machine_run_to(c->machine, next < end ? next : end);

@@ -99,6 +99,8 @@ bool f405_cpu_deliverable(struct f405 *chip)
     int candidate = chip->cpu.candidate;
     if (!candidate || chip->cpu.exception_return)
         return false;
+    if (candidate == EX_NMI) /* DDI0403E B1.5.4: nothing holds it off but itself */
+        return !chip->cpu.active[EX_NMI] && !chip->cpu.active[EX_HARDFAULT];
     unsigned priority = group_priority(chip, candidate);
     if (priority >= running_priority(chip) || get(chip, UC_ARM_REG_PRIMASK) & 1 || get(chip, UC_ARM_REG_FAULTMASK) & 1)
         return false;

@@ -49,6 +49,8 @@ static uint64_t erase_time(const struct f405 *chip, int sector)
 static void begin(struct f405 *chip, uint64_t cycles)
 {
     struct flash *f = &chip->flash;
+    if (f->stale)
+        f405_complain(chip, "the data cache was not reset after an erase");
     f->done = chip->now + cycles;
     if (f->cut_operation && --f->cut_operation == 0)
         f->cut_at = chip->now + cycles / 2;
@@ -121,10 +123,15 @@ bool f405_flash_access(struct f405 *chip, int index, uint32_t offset, bool write
     struct flash *f = &chip->flash;
     switch (offset) {
     case 0x00:
-        if (write)
+        if (write) {
+            if (*value & 1u << 12 && (*value | f->acr) & 1u << 10)
+                f405_complain(chip, "FLASH_ACR 0x%x: the data cache is reset while it is on", *value);
+            else if (*value & 1u << 12)
+                f->stale = false;
             f->acr = *value;
-        else
+        } else {
             *value = f->acr;
+        }
         return true;
     case 0x04:
         if (write && (f->cr & LOCK))
@@ -211,8 +218,10 @@ void f405_flash_event(struct f405 *chip)
         return;
     }
     f->done = F405_NEVER;
-    if (f->sector >= 0)
+    if (f->sector >= 0) {
         memset(chip->flash_bytes + sector_start(f->sector), 0xff, sector_size(f->sector));
+        f->stale = f->acr >> 10 & 1; /* RM0090 3.5.3 */
+    }
     f->sector = -1;
     f->size = 0;
     if (f->cr >> 24 & 1) { /* EOP is set only with EOPIE: 3.9.4 */

@@ -50,6 +50,16 @@ static const struct route *route_of(const struct f405 *chip, int pin)
     return NULL;
 }
 
+bool f405_gpio_is(const struct f405 *chip, int pin, unsigned alternate)
+{
+    return mode(chip, pin) == 2 && function(chip, pin) == alternate;
+}
+
+bool f405_gpio_is_analog(const struct f405 *chip, int pin)
+{
+    return mode(chip, pin) == 3;
+}
+
 static enum f405_level chip_drives(struct f405 *chip, int pin)
 {
     const struct gpio *g = &chip->gpio[pin / 16];

@@ -86,7 +86,9 @@ bool f405_usb_attached(const struct f405 *chip)
 {
     const struct otg *o = &chip->otg;
     bool session = o->gccfg & 1u << 21 || (o->vbus && o->gccfg & 1u << 19);
-    return chip->on && o->vbus && session && o->gccfg & 1u << 16 && !(o->dctl & 2) && o->gusbcfg & 1u << 30;
+    /* DS8626 table 9 */
+    const bool wired = f405_gpio_is(chip, F405_PIN('A', 11), 10) && f405_gpio_is(chip, F405_PIN('A', 12), 10);
+    return chip->on && wired && o->vbus && session && o->gccfg & 1u << 16 && !(o->dctl & 2) && o->gusbcfg & 1u << 30;
 }
 
 /* ---- registers ---- */
@@ -307,6 +309,14 @@ static bool core_access(struct f405 *chip, uint32_t offset, bool write, uint32_t
     }
 }
 
+/* RM0090 34.3 and 7.2.3: 48 MHz, ±0.25 %. */
+static void power_up(struct f405 *chip)
+{
+    const uint32_t hz = f405_rcc_usb_hz(chip);
+    if (hz < 47880000 || hz > 48120000)
+        f405_complain(chip, "OTG_FS: its clock is %u Hz", hz);
+}
+
 bool f405_otg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
@@ -338,6 +348,8 @@ bool f405_otg_access(struct f405 *chip, int index, uint32_t offset, bool write, 
                 *plain[i].reg = *value;
         }
     }
+    if (write && offset == 0x038 && *value & 1u << 16)
+        power_up(chip);
     f405_otg_interrupts(chip);
     return known;
 }

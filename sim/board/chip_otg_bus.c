@@ -71,6 +71,9 @@ void f405_otg_event(struct f405 *chip)
 {
     struct otg *o = &chip->otg;
     o->reset_end = F405_NEVER;
+    /* 34.17.7: at 32 MHz and more the turn-around is 6 clocks. */
+    if (bits(o->gusbcfg, 10, 4) < 6)
+        f405_complain(chip, "OTG_FS: a turn-around time of %u", bits(o->gusbcfg, 10, 4));
     o->gintsts |= ENUMDNE;
     o->dsts = (o->dsts & ~6u) | 3u << 1; /* full speed */
     f405_otg_interrupts(chip);

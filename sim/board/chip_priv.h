@@ -35,12 +35,15 @@ struct rcc {
     uint32_t reg[36];                            /* by offset / 4 */
     unsigned cost;                               /* cycles of 168 MHz an instruction takes */
     unsigned apb1, apb2, tim1_clock, tim2_clock; /* cycles of 168 MHz a clock of the buses and their timers takes */
+    uint64_t hse_ready, pll_ready;               /* when; F405_NEVER: off, or it does not swing */
+    bool no_crystal;
 };
 
 struct flash {
     uint32_t acr, sr, cr, optcr;
     int unlock; /* keys given */
     bool locked_out;
+    bool stale;    /* the data cache may hold what an erase has changed */
     uint64_t done; /* F405_NEVER: idle */
     uint64_t cut_at;
     unsigned cut_operation;
@@ -98,9 +101,9 @@ struct adc {
 };
 
 struct watchdog {
-    uint32_t pr, rlr;
+    uint32_t pr, rlr, rlr_before;
     bool started, writable;
-    uint64_t expires;
+    uint64_t expires, pr_taken, rlr_taken; /* when what was written holds */
 };
 
 struct otg_endpoint {
@@ -195,6 +198,7 @@ f405_peripheral_access f405_rcc_access, f405_pwr_access, f405_dbgmcu_access, f40
 
 void f405_rcc_reset(struct f405 *chip, uint32_t flags);
 bool f405_rcc_enabled(const struct f405 *chip, uint32_t offset, int bit);
+uint32_t f405_rcc_usb_hz(struct f405 *chip); /* of the PLL's output Q; 0: it is off */
 uint64_t f405_iwdg_next(const struct f405 *chip);
 void f405_iwdg_event(struct f405 *chip);
 
@@ -206,6 +210,9 @@ void f405_flash_power_cut(struct f405 *chip);
 
 void f405_gpio_reset(struct f405 *chip);
 void f405_gpio_update(struct f405 *chip, int pin, uint64_t at);
+/* Whether a pin is switched to this alternate function; whether it is analog. */
+bool f405_gpio_is(const struct f405 *chip, int pin, unsigned function);
+bool f405_gpio_is_analog(const struct f405 *chip, int pin);
 /* The output of a peripheral that may be routed to pins has changed. */
 void f405_gpio_timer_output(struct f405 *chip, int timer, int channel, uint64_t at);
 void f405_exti_edge(struct f405 *chip, int line, bool rising);

@@ -7,6 +7,9 @@ enum { CR = 0, PLLCFGR = 1, CFGR = 2, CIR = 3, AHB1RSTR = 4, AHB1ENR = 12, APB1E
 #define HSE_HZ 8000000u
 #define HSI_HZ 16000000u
 #define LSI_HZ 32000u
+#define HSE_STARTS (2 * (F405_HZ / 1000u))  /* DS8626 table 33: 2 ms, typical */
+#define PLL_LOCKS (3 * (F405_HZ / 10000u))  /* table 37: 300 us at most */
+#define IWDG_TAKES (5 * (F405_HZ / LSI_HZ)) /* RM0090 21.4.4: five clocks of the LSI */
 
 static unsigned prescale(uint32_t field, unsigned one, const uint16_t *table)
 {
@@ -28,6 +31,22 @@ static uint32_t pll_hz(struct f405 *chip)
     return vco / p;
 }
 
+uint32_t f405_rcc_usb_hz(struct f405 *chip)
+{
+    const uint32_t cfg = chip->rcc.reg[PLLCFGR];
+    if (chip->now < chip->rcc.pll_ready)
+        return 0;
+    return pll_hz(chip) * 2 * (bits(cfg, 16, 2) + 1) / bits(cfg, 24, 4);
+}
+
+/* The oscillators' and the PLL's ready bits are what time says. */
+static uint32_t control(const struct f405 *chip)
+{
+    const struct rcc *r = &chip->rcc;
+    return (r->reg[CR] & ~(1u << 17 | 1u << 25)) | (uint32_t)(chip->now >= r->hse_ready) << 17 |
+           (uint32_t)(chip->now >= r->pll_ready) << 25;
+}
+
 static void clocks(struct f405 *chip)
 {
     static const uint16_t ahb[8] = {2, 4, 8, 16, 64, 128, 256, 512}, apb[4] = {2, 4, 8, 16};
@@ -41,6 +60,8 @@ static void clocks(struct f405 *chip)
     /* RM0090 table 11, 2.7 to 3.6 V: a wait state for each 30 MHz. */
     if (hz && (chip->flash.acr & 7) < (hz - 1) / 30000000)
         f405_complain(chip, "flash with %u wait states at %u Hz", chip->flash.acr & 7, hz);
+    if (hz > 144000000 && !(chip->pwr_cr & 1u << 14)) /* RM0090 5.1.3 */
+        f405_complain(chip, "%u Hz with the regulator at scale 2", hz);
     chip->rcc.cost = hz ? (F405_HZ + hz / 2) / hz : 1;
     chip->rcc.apb1 = chip->rcc.cost * p1;
     chip->rcc.apb2 = chip->rcc.cost * p2;
@@ -54,6 +75,7 @@ void f405_rcc_reset(struct f405 *chip, uint32_t flags)
     uint32_t csr = chip->rcc.reg[CSR], bdcr = chip->rcc.reg[BDCR];
     memset(chip->rcc.reg, 0, sizeof chip->rcc.reg);
     chip->rcc.reg[CR] = 0x83;
+    chip->rcc.hse_ready = chip->rcc.pll_ready = F405_NEVER;
     chip->rcc.reg[PLLCFGR] = 0x24003010;
     chip->rcc.reg[AHB1ENR] = 0x00100000;
     chip->rcc.reg[20] = 0x7E6791FF; /* the low-power enables: 7.3.15 to 7.3.19 */
@@ -73,18 +95,58 @@ bool f405_rcc_enabled(const struct f405 *chip, uint32_t offset, int bit)
     return chip->rcc.reg[offset / 4] >> bit & 1;
 }
 
+static void switch_oscillators(struct f405 *chip, uint32_t value)
+{
+    struct rcc *r = &chip->rcc;
+    const uint32_t on = value & ~r->reg[CR], off = ~value & r->reg[CR];
+    if (off & 1u << 16)
+        r->hse_ready = F405_NEVER;
+    if (off & 1u << 24)
+        r->pll_ready = F405_NEVER;
+    if (on & 1u << 16 && !r->no_crystal)
+        r->hse_ready = chip->now + HSE_STARTS;
+    if (on & 1u << 24) {
+        if (r->reg[PLLCFGR] & 1u << 22 && chip->now < r->hse_ready)
+            f405_complain(chip, "the PLL is started before the crystal swings");
+        r->pll_ready = chip->now + PLL_LOCKS;
+    }
+}
+
+/* 7.2.7: the clock security system goes to the HSI, switches the crystal and the PLL off and raises an NMI. */
+void f405_set_crystal(struct f405 *chip, bool works)
+{
+    struct rcc *r = &chip->rcc;
+    r->no_crystal = !works;
+    if (works || !chip->on || !(r->reg[CR] & 1u << 16))
+        return;
+    if (!(r->reg[CR] & 1u << 19)) {
+        f405_complain(chip, "the crystal stops and nobody is told");
+        return;
+    }
+    r->hse_ready = r->pll_ready = F405_NEVER;
+    r->reg[CR] &= ~(1u << 16 | 1u << 24);
+    r->reg[CFGR] &= ~0xfu;
+    r->reg[CIR] |= 1u << 7;
+    for (int t = 1; t < TIMERS; t++)
+        f405_timer_sync(chip, t, chip->now);
+    clocks(chip);
+    f405_cpu_pend(chip, EX_NMI);
+    f405_schedule(chip);
+}
+
 static void write_register(struct f405 *chip, int i, uint32_t value)
 {
     uint32_t *reg = chip->rcc.reg;
     switch (i) {
-    case CR: /* oscillators and the PLL are ready at once */
+    case CR:
         value &= 0x01050081u | 0x000000f8u | 1u << 19 | 1u << 26;
         if ((reg[CFGR] & 3) == 2 && !(value & 1u << 24)) {
             f405_complain(chip, "the PLL is switched off while it drives the system");
             return;
         }
+        switch_oscillators(chip, value);
         reg[CR] = (reg[CR] & 0xff00) | (value & ~(1u << 1 | 1u << 17 | 1u << 25 | 1u << 27)) | (value & 1) << 1 |
-                  (value >> 16 & 1) << 17 | (value >> 24 & 1) << 25 | (value >> 26 & 1) << 27;
+                  (value >> 26 & 1) << 27;
         break;
     case PLLCFGR:
         if (reg[CR] & 1u << 24)
@@ -93,7 +155,7 @@ static void write_register(struct f405 *chip, int i, uint32_t value)
         break;
     case CFGR: {
         static const int ready[4] = {1, 17, 25, 31};
-        if (!(reg[CR] >> ready[value & 3] & 1))
+        if (!(control(chip) >> ready[value & 3] & 1))
             f405_complain(chip, "RCC_CFGR 0x%08x: the clock is not ready", value);
         reg[CFGR] = (value & ~0xcu) | (value & 3) << 2;
         for (int t = 1; t < TIMERS; t++)
@@ -118,7 +180,7 @@ bool f405_rcc_access(struct f405 *chip, int index, uint32_t offset, bool write, 
     if (write)
         write_register(chip, (int)(offset / 4), *value);
     else
-        *value = chip->rcc.reg[offset / 4];
+        *value = offset == 0 ? control(chip) : chip->rcc.reg[offset / 4];
     return true;
 }
 
@@ -158,7 +220,8 @@ static void iwdg_restart(struct f405 *chip)
 {
     struct watchdog *w = &chip->watchdog;
     uint64_t divider = 4u << (w->pr > 6 ? 6 : w->pr);
-    w->expires = chip->now + (w->rlr + 1) * divider * (F405_HZ / LSI_HZ);
+    const uint32_t reload = chip->now < w->rlr_taken ? w->rlr_before : w->rlr;
+    w->expires = chip->now + (reload + 1) * divider * (F405_HZ / LSI_HZ);
 }
 
 bool f405_iwdg_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
@@ -182,6 +245,12 @@ bool f405_iwdg_access(struct f405 *chip, int index, uint32_t offset, bool write,
         uint32_t *reg = offset == 4 ? &w->pr : &w->rlr;
         if (write && !w->writable)
             f405_complain(chip, "IWDG register 0x%x written without its key", offset);
+        if (write && chip->now < (offset == 4 ? w->pr_taken : w->rlr_taken))
+            f405_complain(chip, "IWDG register 0x%x written before the last value was taken", offset);
+        if (write && offset == 8 && chip->now >= w->rlr_taken)
+            w->rlr_before = w->rlr;
+        if (write)
+            *(offset == 4 ? &w->pr_taken : &w->rlr_taken) = chip->now + IWDG_TAKES;
         if (write)
             *reg = *value & (offset == 4 ? 7u : 0xfffu);
         else
@@ -189,7 +258,7 @@ bool f405_iwdg_access(struct f405 *chip, int index, uint32_t offset, bool write,
         return true;
     }
     case 12:
-        *value = 0; /* updates are done at once */
+        *value = (uint32_t)(chip->now < w->pr_taken) | (uint32_t)(chip->now < w->rlr_taken) << 1;
         return !write;
     default:
         return false;

@@ -8,6 +8,30 @@ enum { FE = 2, ORE = 8, IDLE = 0x10, RXNE = 0x20, TC = 0x40, TXE = 0x80 };
 enum { RE = 4, TE = 8, IDLEIE = 0x10, RXNEIE = 0x20, TCIE = 0x40, TXEIE = 0x80, UE = 0x2000, OVER8 = 0x8000 };
 enum { EIE = 1, DMAR = 0x40, DMAT = 0x80 };
 
+/* DS8626 table 9: the pins a USART's line can be at. */
+#define NO_PIN 255
+static bool wired(const struct f405 *chip, int index, bool transmit)
+{
+    static const struct {
+        uint8_t function, pins[2][3]; /* receiving, sending */
+    } map[F405_USARTS] = {
+        [1] = {7, {{F405_PIN('A', 10), F405_PIN('B', 7), NO_PIN}, {F405_PIN('A', 9), F405_PIN('B', 6), NO_PIN}}},
+        [2] = {7, {{F405_PIN('A', 3), F405_PIN('D', 6), NO_PIN}, {F405_PIN('A', 2), F405_PIN('D', 5), NO_PIN}}},
+        [3] = {7,
+               {{F405_PIN('B', 11), F405_PIN('C', 11), F405_PIN('D', 9)},
+                {F405_PIN('B', 10), F405_PIN('C', 10), F405_PIN('D', 8)}}},
+        [4] = {8, {{F405_PIN('A', 1), F405_PIN('C', 11), NO_PIN}, {F405_PIN('A', 0), F405_PIN('C', 10), NO_PIN}}},
+        [5] = {8, {{F405_PIN('D', 2), NO_PIN, NO_PIN}, {F405_PIN('C', 12), NO_PIN, NO_PIN}}},
+        [6] = {8, {{F405_PIN('C', 7), F405_PIN('G', 9), NO_PIN}, {F405_PIN('C', 6), F405_PIN('G', 14), NO_PIN}}},
+    };
+    for (int i = 0; i < 3; i++) {
+        const int pin = map[index].pins[transmit][i];
+        if (pin != NO_PIN && f405_gpio_is(chip, pin, map[index].function))
+            return true;
+    }
+    return false;
+}
+
 void f405_usart_reset(struct f405 *chip)
 {
     for (int i = 1; i < F405_USARTS; i++)
@@ -86,7 +110,7 @@ static void transmit(struct f405 *chip, int index, uint8_t byte)
 static void sent(struct f405 *chip, int index)
 {
     struct usart *u = &chip->usart[index];
-    if (chip->ops->uart_out)
+    if (chip->ops->uart_out && wired(chip, index, true))
         chip->ops->uart_out(chip->context, index, u->shift, u->sent);
     if (u->holding) {
         u->shift = u->hold;
@@ -108,7 +132,7 @@ static void arrived(struct f405 *chip, int index)
     bool more = u->head != u->tail;
     u->arrives = more ? at + byte_time(chip, index) : F405_NEVER;
     u->idle = more ? F405_NEVER : at + byte_time(chip, index); /* a frame's length of silence */
-    if ((u->cr1 & (UE | RE)) != (UE | RE))
+    if ((u->cr1 & (UE | RE)) != (UE | RE) || !wired(chip, index, false))
         return;
     if (u->sr & RXNE) {
         u->sr |= ORE;
@@ -233,6 +257,11 @@ void f405_adc_event(struct f405 *chip)
     struct adc *a = &chip->adc;
     int channel = ranked_channel(a);
     bool last = a->rank >= (int)bits(a->sqr[0], 20, 4);
+    /* Table 7: where the channels' pins are. */
+    if (channel < 16 && !f405_gpio_is_analog(chip, channel < 8    ? F405_PIN('A', channel)
+                                                   : channel < 10 ? F405_PIN('B', channel - 8)
+                                                                  : F405_PIN('C', channel - 10)))
+        f405_complain(chip, "ADC1 channel %d: its pin is not analog", channel);
     a->done = F405_NEVER;
     a->dr = chip->ops->adc ? (uint32_t)chip->ops->adc(chip->context, channel) & 0xfff : 0;
     if (last || a->cr2 & 1u << 10)

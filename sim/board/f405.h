@@ -82,6 +82,9 @@ bool f405_is_on(const struct f405 *chip);
 const struct f405_exception_stats *f405_stats(const struct f405 *chip, int exception);
 void f405_clear_stats(struct f405 *chip);
 
+/* The crystal breaks, or swings again. */
+void f405_set_crystal(struct f405 *chip, bool works);
+
 /* The outside drives a pin or lets go of it, now. */
 void f405_drive(struct f405 *chip, int pin, enum f405_level level);
 /* What the chip drives it with. */

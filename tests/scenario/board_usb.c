@@ -93,6 +93,28 @@ static void what_the_device_does_not_know_is_stalled_and_nothing_hangs(void **st
     board_fixture_finish(&f);
 }
 
+static void write_part(struct board_fixture *f, unsigned size)
+{
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_write_profile_tag};
+    lumi_wire_Reply reply = {0};
+    struct lumi_error error;
+    request.command.write_profile.data.size = (pb_size_t)size;
+    memset(request.command.write_profile.data.bytes, (int)size, size);
+    board_client_request(f->client, &request, &reply, &error);
+    assert_int_equal(reply.result, lumi_wire_Result_DONE);
+}
+
+/* One packet each way, so that both ends would have stood at DATA1. */
+static void a_cleared_halt_begins_with_data0(struct board_fixture *f, uint16_t endpoint)
+{
+    write_part(f, 4);
+    assert_int_equal(usb_control(f->machine, 0x02, 3, 0, endpoint, NULL, 0, NULL), USB_DONE);
+    assert_int_equal(usb_control(f->machine, 0x02, 1, 0, endpoint, NULL, 0, NULL), USB_DONE);
+    usb_host_clear_toggle(f405_machine_usb(f->machine), endpoint);
+    write_part(f, 4);
+    assert_int_equal(board_client_wire(f->client)->retries, 0);
+}
+
 static void a_halted_endpoint_stalls_until_it_is_cleared(void **state)
 {
     struct board_fixture f;
@@ -111,6 +133,8 @@ static void a_halted_endpoint_stalls_until_it_is_cleared(void **state)
     assert_int_equal(usb_bulk(f.machine, LUMI_WIRE_USB_OUT, data, 4, false, 0.1, NULL), USB_DONE);
     f.client = board_client_create(f.machine, BOARD_LINK_USB);
     BOARD_OK(board_client_open(f.client, 3, error));
+    for (int i = 0; i < 6; i++)
+        a_cleared_halt_begins_with_data0(&f, i & 1 ? LUMI_WIRE_USB_IN : LUMI_WIRE_USB_OUT);
     board_fixture_finish(&f);
 }
 
@@ -120,16 +144,22 @@ static void frames_of_every_length_pass_with_their_empty_packets(void **state)
     (void)state;
     board_fixture_init(&f);
     board_fixture_connect(&f, BOARD_LINK_USB);
-    for (unsigned size = 1; size <= 140; size++) {
-        lumi_wire_Request request = {.which_command = lumi_wire_Request_write_profile_tag};
-        lumi_wire_Reply reply = {0};
-        struct lumi_error error;
-        request.command.write_profile.data.size = (pb_size_t)size;
-        memset(request.command.write_profile.data.bytes, (int)size, size);
-        board_client_request(f.client, &request, &reply, &error);
-        assert_int_equal(reply.result, lumi_wire_Result_DONE);
-    }
+    for (unsigned size = 1; size <= 140; size++)
+        write_part(&f, size);
     assert_int_equal(board_client_wire(f.client)->retries, 0);
+    BOARD_OK(board_client_configure(f.client, &f.rig, error));
+    const uint32_t retries = board_client_wire(f.client)->retries; /* while the flash was erased */
+    uint32_t whole = 0;
+    for (uint32_t size = 0; size <= 140; size++) { /* and back */
+        lumi_wire_Request request = {.which_command = lumi_wire_Request_read_profile_tag};
+        lumi_wire_Reply reply = {0};
+        request.command.read_profile.offset = whole - (whole ? size : 0);
+        BOARD_OK(board_client_request(f.client, &request, &reply, error));
+        whole = reply.payload.profile.size;
+        assert_true(whole > 140);
+        assert_true(size == 0 || reply.payload.profile.data.size == size);
+    }
+    assert_int_equal(board_client_wire(f.client)->retries, retries);
     /* Empty packets and rubbish between frames do no harm. */
     uint8_t rubbish[130];
     memset(rubbish, 0x5a, sizeof rubbish);

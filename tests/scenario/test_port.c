@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-enum { SAY = 0, MOVE, STOP, TRIGGERS, WHEN_FEEDBACK, WHEN_STEP };
+enum { SAY = 0, MOVE, STOP, TRIGGERS, WHEN_FEEDBACK, WHEN_STEP, HOLD, HANG };
 #define PULSES_MAX 120000
 
 static struct {
@@ -21,12 +21,19 @@ static struct {
     int rise_count, fall_count, edge_count;
     uint8_t said[24];
     size_t said_count;
+    int moved;       /* times that the brake opened, the motor was switched off or a trigger rose */
+    int blinks;      /* of the status light */
+    int not_enabled; /* bytes sent without the line's driver */
     uint64_t seed;
 } bench;
 
 static void on_pin(void *context, int pin, enum f405_level level, uint64_t at)
 {
     (void)context;
+    if (level == F405_HIGH && (pin == F405_PIN('A', 6) || pin == F405_PIN('A', 7) || pin / 16 == 1))
+        bench.moved++;
+    if (level == F405_HIGH && pin == F405_PIN('C', 5))
+        bench.blinks++;
     if (pin == F405_PIN('A', 0) && level == F405_HIGH)
         bench.rises[bench.rise_count++] = at;
     else if (pin == F405_PIN('A', 0))
@@ -38,6 +45,8 @@ static void on_pin(void *context, int pin, enum f405_level level, uint64_t at)
 static void on_byte(void *context, int usart, uint8_t byte, uint64_t at)
 {
     (void)context, (void)at;
+    if (usart == 2 && f405_output(bench.chip, F405_PIN('A', 1)) != F405_HIGH)
+        bench.not_enabled++;
     if (usart == 2 && bench.said_count < sizeof bench.said)
         bench.said[bench.said_count++] = byte;
 }
@@ -86,11 +95,18 @@ static void forget(void)
     bench.rise_count = bench.fall_count = bench.edge_count = 0;
 }
 
+/* The one that was built with this test, or the one the environment names. */
+static const char *image_path(void)
+{
+    const char *image = getenv("LUMI_PORT_IMAGE");
+    return image ? image : LUMI_FIRMWARE "/port-exercise.bin";
+}
+
 static int boot(void **state)
 {
     static const struct f405_ops ops = {.pin = on_pin, .uart_out = on_byte, .adc = supply};
     static uint8_t image[0x20000];
-    FILE *file = fopen(LUMI_FIRMWARE "/port-exercise.bin", "rb");
+    FILE *file = fopen(image_path(), "rb");
     (void)state;
 
     if (!file)
@@ -212,6 +228,113 @@ static void trigger_edges_are_at_their_ticks_while_steps_are_made(void **state)
     assert_true(most - least <= 25);
 }
 
+static void a_wire_that_has_come_off_reads_as_what_it_is_safest_to_believe(void **state)
+{
+    (void)state;
+    f405_drive(bench.chip, F405_PIN('C', 6), F405_HIGH);
+    assert_int_equal(command(SAY, 0, 0, 0, 3) & 0xfff, 0x40); /* "reached" alone */
+    const uint32_t presses = command(SAY, 0, 0, 0, 2);
+    for (int i = 0; i < 12; i++)
+        f405_drive(bench.chip, F405_PIN('C', i), F405_FLOATING);
+    f405_drive(bench.chip, F405_PIN('A', 3), F405_FLOATING);
+    run(0.001);
+    /* All inputs but the last, "reached"; no feedback. */
+    assert_int_equal(command(SAY, 0, 0, 0, 3) & 0xfff, 0x3f);
+    assert_int_equal(command(SAY, 0, 0, 0, 2), presses + 1);
+    for (int i = 0; i < 12; i++)
+        f405_drive(bench.chip, F405_PIN('C', i), i < 6 || i > 9 ? F405_LOW : F405_HIGH);
+    run(0.001);
+}
+
+static void the_line_s_driver_is_on_while_bytes_are_sent_and_only_then(void **state)
+{
+    (void)state;
+    assert_int_equal(f405_output(bench.chip, F405_PIN('A', 1)), F405_LOW);
+    command(SAY, 0, 0, 0, 0);
+    assert_int_equal(f405_output(bench.chip, F405_PIN('A', 1)), F405_LOW);
+    assert_int_equal(bench.not_enabled, 0);
+}
+
+/* What the chip does by itself must not let go of the arm, nor fire. */
+static void restarted(uint32_t resets, uint32_t cause)
+{
+    for (int i = 0; i < 100 && f405_resets(bench.chip) == resets; i++)
+        run(0.02);
+    assert_int_equal(f405_resets(bench.chip), resets + 1);
+    forget();
+    run(0.1);
+    assert_int_equal(bench.rise_count, 0);
+    assert_int_equal(bench.moved, 0);
+    assert_int_equal(command(SAY, 0, 0, 0, 3) >> 16, cause);
+}
+
+/* enum board_reset */
+enum { PIN = 1, WATCHDOG = 3 };
+
+static void a_start_moves_nothing_and_opens_nothing(void **state)
+{
+    (void)state;
+    bench.moved = 0;
+    command(SAY, 0, 0, 0, 0);
+    const uint32_t resets = f405_resets(bench.chip);
+    f405_reset_pin(bench.chip);
+    restarted(resets, PIN);
+}
+
+static void a_main_loop_that_hangs_is_ended_by_the_watchdog(void **state)
+{
+    static const uint32_t words[4] = {HANG, 0, 0, 0};
+    (void)state;
+    bench.moved = 0;
+    const uint32_t resets = f405_resets(bench.chip);
+    f405_uart_in(bench.chip, 2, (const uint8_t *)words, sizeof words);
+    restarted(resets, WATCHDOG);
+}
+
+/* 5 µs are less than a period; 25 µs hold back more than one pulse's interrupt. */
+static void a_pulse_that_was_missed_stops_all_of_them(void **state)
+{
+    static const uint32_t words[4] = {HOLD, 2100, 0, 0};
+    (void)state;
+    bench.moved = 0;
+    forget();
+    const uint32_t resets = f405_resets(bench.chip);
+    command(MOVE, 20000, 840, 420, 0);
+    command(HOLD, 420, 0, 0, 0);
+    run(0.3);
+    assert_int_equal(bench.rise_count, 20000);
+    assert_int_equal(command(SAY, 0, 0, 0, 0), 20000);
+    command(MOVE, 100000, 840, 420, 0);
+    f405_uart_in(bench.chip, 2, (const uint8_t *)words, sizeof words);
+    run(0.01);
+    const int risen = bench.rise_count;
+    run(0.01);
+    assert_int_equal(bench.rise_count, risen);
+    restarted(resets, WATCHDOG);
+}
+
+static void a_crystal_that_breaks_ends_the_steps_and_the_light_says_so(void **state)
+{
+    (void)state;
+    bench.moved = 0;
+    forget();
+    const uint32_t resets = f405_resets(bench.chip);
+    command(MOVE, 100000, 840, 420, 0);
+    f405_set_crystal(bench.chip, false);
+    run(0.001);
+    const int risen = bench.rise_count;
+    run(1.5);
+    assert_int_equal(bench.rise_count, risen);
+    assert_int_equal(f405_resets(bench.chip), resets + 1); /* and stays there: no watchdog runs */
+    const int blinks = bench.blinks;
+    run(1);
+    assert_in_range(bench.blinks - blinks, 2, 50);
+    assert_int_equal(bench.moved, 0);
+    f405_set_crystal(bench.chip, true);
+    f405_reset_pin(bench.chip);
+    restarted(resets + 1, WATCHDOG); /* what has ended the last run is not forgotten */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -219,9 +342,16 @@ int main(void)
         cmocka_unit_test(an_emergency_stop_at_any_time_lets_no_pulse_rise_and_loses_none),
         cmocka_unit_test(a_stop_at_any_time_loses_no_pulse_either),
         cmocka_unit_test(times_of_feedbacks_and_steps_are_one_clock_to_the_tick),
+        cmocka_unit_test(a_wire_that_has_come_off_reads_as_what_it_is_safest_to_believe),
+        cmocka_unit_test(the_line_s_driver_is_on_while_bytes_are_sent_and_only_then),
+        cmocka_unit_test(a_start_moves_nothing_and_opens_nothing),
+        cmocka_unit_test(a_main_loop_that_hangs_is_ended_by_the_watchdog),
+        cmocka_unit_test(a_pulse_that_was_missed_stops_all_of_them),
+        cmocka_unit_test(a_crystal_that_breaks_ends_the_steps_and_the_light_says_so),
+        /* It leaves triggers under way. */
         cmocka_unit_test(trigger_edges_are_at_their_ticks_while_steps_are_made),
     };
-    FILE *image = fopen(LUMI_FIRMWARE "/port-exercise.bin", "rb");
+    FILE *image = fopen(image_path(), "rb");
     if (!image) {
         puts("skipped: the firmware is not built here");
         return 77;

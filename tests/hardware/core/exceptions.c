@@ -83,7 +83,10 @@ int main(void)
 {
     float before = 1.5f, low, high;
     REG(0x40023844) = 1u << 4; /* USART1's clock */
-    REG(0x40011008) = 16;      /* 1 Mbit/s */
+    REG(0x40023830) = 1u << 0; /* GPIOA's: PA9 is its line, function 7 */
+    REG(0x40020024) = 7u << 4;
+    REG(0x40020000) = 0xA8080000;
+    REG(0x40011008) = 16; /* 1 Mbit/s */
     REG(0x4001100C) = 0x2008;
     REG(0xE000ED88) = 0xf00000; /* the FPU */
     BARRIER();

@@ -1,13 +1,14 @@
 /* A core of a few lines for the emulated board: it does what 16 bytes on the serial line say, so that the port can be
  * tried without the firmware around it. Commands are four words; the answer is six: pulses told, edges told, presses
- * told, 0, and a time. Compiled for the board (firmware/stm32f405/cross), run by test_port. */
+ * told, the cause of the reset in bits 16 and up with the inputs and feedbacks below it, and a time. Compiled for the
+ * board (firmware/stm32f405/cross), run by test_port. */
 #include "firmware/core/core.h"
 #include "firmware/stm32f405/cortex.h"
 #include "firmware/stm32f405/port.h"
 
 #include <string.h>
 
-enum { SAY = 0, MOVE, STOP, TRIGGERS, WHEN_FEEDBACK, WHEN_STEP };
+enum { SAY = 0, MOVE, STOP, TRIGGERS, WHEN_FEEDBACK, WHEN_STEP, HOLD, HANG };
 
 struct core {
     volatile uint32_t pulses, edges, presses;
@@ -50,6 +51,28 @@ void core_on_feedback(struct core *c, int input, bool active, uint64_t at)
     c->feedback_at = at;
 }
 
+static uint32_t levels(void)
+{
+    uint32_t all = (uint32_t)system_reset_cause() << 16;
+
+    for (int i = 0; i < BOARD_INPUTS; i++)
+        all |= (uint32_t)pin_input((enum board_input)i) << i;
+    for (int i = 0; i < 4; i++)
+        all |= (uint32_t)pin_feedback(i) << (8 + i);
+    return all;
+}
+
+/* Holds the core's interrupts off for so many ticks. */
+static void hold(uint32_t ticks)
+{
+    const uint32_t before = basepri_raise(PRIORITY_CORE);
+    const uint64_t begun = time_now();
+
+    while (time_now() - begun < ticks)
+        ;
+    basepri_restore(before);
+}
+
 static void execute(struct core *c, const uint32_t command[4])
 {
     uint64_t when = command[0] == WHEN_STEP ? c->step_at : c->feedback_at;
@@ -67,10 +90,15 @@ static void execute(struct core *c, const uint32_t command[4])
         c->lines = 1;
         c->trigger = time_now() + BOARD_TICK_HZ / 1000;
         trigger_at(c->trigger, c->lines);
+    } else if (command[0] == HOLD) {
+        hold(command[1]);
     }
+    while (command[0] == HANG)
+        ;
     answer[0] = c->pulses;
     answer[1] = c->edges;
     answer[2] = c->presses;
+    answer[3] = levels();
     memcpy(answer + 4, &when, sizeof when);
     serial_write((const uint8_t *)answer, sizeof answer);
 }
