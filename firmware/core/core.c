@@ -63,9 +63,11 @@ void core_state_event(struct core *core, enum state_event event)
 
 void core_rest(struct core *core)
 {
-    /* Marks or turns that did not come as they should: wherever the platform is, it is not where its steps say. */
+    /* Marks or turns that did not come as they should, a motor that may have been without current: wherever the
+     * platform is, it is not where its steps say. */
     if (core->safety.standing &
-        (1u << LUMI_RIG_FAULT_INDEX_MISSED | 1u << LUMI_RIG_FAULT_INDEX_EARLY | 1u << LUMI_RIG_FAULT_OVERSPEED))
+        (1u << LUMI_RIG_FAULT_INDEX_MISSED | 1u << LUMI_RIG_FAULT_INDEX_EARLY | 1u << LUMI_RIG_FAULT_OVERSPEED |
+         1u << LUMI_RIG_FAULT_DRIVER | 1u << LUMI_RIG_FAULT_SUPPLY))
         motion_forget(&core->motion);
     const bool known = motion_known(&core->motion);
 

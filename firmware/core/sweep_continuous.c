@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#define CRUISE_MARGIN 0.05                /* s of cruise before the first exposure and after the last */
 #define RECORD_AHEAD (BOARD_TICK_HZ / 50) /* a record pulse is queued 20 ms ahead */
 #define RETRY_TICKS (BOARD_TICK_HZ / 1000)
 
@@ -26,8 +25,7 @@ static uint32_t last_shot(const struct core *core)
 void sweep_plan_continuous(struct core *core)
 {
     struct sweep *s = &core->sweep;
-    const double backlash = core->rig.control.motion.backlash / (2 * LUMI_PI);
-    const double run_up = fmax(lumi_plan_run_up(&core->plan, &core->rig), backlash);
+    const double run_up = lumi_plan_run_up(&core->plan, &core->rig);
     double first;
 
     if (video(core)) {

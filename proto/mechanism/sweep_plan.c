@@ -157,12 +157,10 @@ double lumi_plan_run_down(const struct lumi_plan *plan, const struct lumi_rig *r
     return (ramp_seconds(plan, rig) / 2 + held_seconds(plan)) / plan->turn_time;
 }
 
-/* The ramp is longer than the backlash, or the platform turns at speed for the rest of it. */
+/* The play may end only when the speed is reached: the platform gets a knock then, which has to swing out. */
 static double up_seconds(const struct lumi_plan *plan, const struct lumi_rig *rig)
 {
-    double backlash = rig->control.motion.backlash / lumi_plan_speed(plan);
-
-    return fmax(backlash - ramp_seconds(plan, rig) / 2, 0) + held_seconds(plan);
+    return rig->control.motion.backlash / lumi_plan_speed(plan) + LUMI_PLAN_SWING_MARGIN + held_seconds(plan);
 }
 
 double lumi_plan_run_up(const struct lumi_plan *plan, const struct lumi_rig *rig)

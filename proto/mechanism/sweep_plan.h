@@ -44,6 +44,7 @@ struct lumi_plan {
 #define LUMI_PLAN_PULSE_GAP 0.005    /* s a trigger line is low between two pulses, at least */
 #define LUMI_PLAN_SHOT_MARGIN 0.001  /* s between two shots that the board keeps for itself */
 #define LUMI_PLAN_CRUISE_MARGIN 0.05 /* s of constant speed before the first exposure and behind the last */
+#define LUMI_PLAN_SWING_MARGIN 0.1   /* s more of it before the first: what ramp and play have stirred swings out */
 #define LUMI_PLAN_MOVE_MARGIN 0.02   /* s of a position's time that the board keeps for itself */
 
 /* One turn count, 72 positions, 30 s, continuous, one exposure of 1/250 s, all cameras: what `rig` is meant for. */
@@ -80,7 +81,7 @@ double lumi_plan_exposure_offset(const struct lumi_plan *plan, const struct lumi
 double lumi_plan_exposure_spacing(const struct lumi_plan *plan, const struct lumi_rig *rig, int k);
 
 /* Continuous and video: the platform's speed; how far before position 0 it starts from rest and how far behind the
- * sweep's last place it comes to rest, in turns: the ramp (or the backlash, if that is more) and what it turns at
+ * sweep's last place it comes to rest, in turns: the ramp, the backlash before the sweep, and what it turns at
  * constant speed besides. */
 double lumi_plan_speed(const struct lumi_plan *plan); /* rad/s */
 double lumi_plan_run_up(const struct lumi_plan *plan, const struct lumi_rig *rig);

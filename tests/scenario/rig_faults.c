@@ -27,6 +27,10 @@ static void choose(struct rig_operator *o, int seed)
     if (seed % 7 == 0)
         for (int r = LUMI_RIG_FAULT_ESTOP + 1; r < LUMI_RIG_FAULTS; r++)
             f->rig.control.safety.reactions[r].triggers = LUMI_RIG_TRIGGERS_FINISH;
+    if (seed % 9 == 4 && (f->rig.string.held || brake))
+        for (int r = 0; r < LUMI_RIG_FAULTS; r++)
+            f->rig.control.safety.reactions[r].motor = LUMI_RIG_MOTOR_OFF,
+            f->rig.control.safety.reactions[r].brake = true;
     lumi_plan_init(&f->plan, &f->rig);
     f->plan.turn_time = 10;
     f->plan.exposures[0] = 1.0 / 1000;

@@ -108,6 +108,29 @@ static void two_cameras_take_7776_frames_with_brackets_in_33_minutes(void **stat
     rig_fixture_finish(&f);
 }
 
+/* Play up to most of what the profile says is taken up before every beginning, and what it stirs has swung out. */
+static void a_belt_with_play_puts_nothing_off_its_angle(void **state)
+{
+    static const double shares[] = {0.2, 0.4, 0.8}, times[] = {30, 60, 120};
+    double worst[2] = {0};
+
+    (void)state;
+    for (int k = 0; k < 15; k++) {
+        struct rig_fixture f;
+        rig_fixture_init(&f, "arc16x2");
+        f.plan.mode = k < 9 ? LUMI_PLAN_CONTINUOUS : LUMI_PLAN_START_STOP;
+        f.plan.turn_time = times[k < 9 ? k % 3 : 1 + k % 2];
+        f.options.mechanics.backlash = shares[k < 9 ? k / 3 : (k - 9) / 2] * f.rig.control.motion.backlash;
+        rig_fixture_start(&f);
+        worst[k >= 9] = fmax(worst[k >= 9], rig_fixture_sweep(&f).angle_worst);
+        rig_fixture_finish(&f);
+    }
+    print_message("play of up to 0.4 deg in the belt: worst %.5f deg turning, %.5f in start-stop\n", worst[0],
+                  worst[1]);
+    assert_true(worst[0] < ANGLE_MOST);
+    assert_true(worst[1] < SWING_MOST);
+}
+
 static void an_arm_that_swings_for_long_is_seen_to_swing(void **state)
 {
     struct rig_fixture f;
@@ -134,6 +157,7 @@ int main(void)
         cmocka_unit_test(thirty_two_rows_in_two_turns_on_the_string),
         cmocka_unit_test(two_cameras_take_2592_frames_in_nine_minutes),
         cmocka_unit_test(two_cameras_take_7776_frames_with_brackets_in_33_minutes),
+        cmocka_unit_test(a_belt_with_play_puts_nothing_off_its_angle),
         cmocka_unit_test(an_arm_that_swings_for_long_is_seen_to_swing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -63,6 +63,7 @@ struct bench {
     lumi_wire_SweepEnded ended;
     lumi_wire_Homed homed;
     lumi_wire_Feedback feedback;
+    lumi_wire_TurnMark turn_mark; /* the last */
     lumi_wire_State state;
     char note[64];
 };
@@ -199,6 +200,7 @@ static void bench_on_event(void *context, const lumi_wire_Event *event)
         b->feedbacks++;
         break;
     case lumi_wire_Event_turn_mark_tag:
+        b->turn_mark = event->kind.turn_mark;
         b->turn_marks++;
         break;
     case lumi_wire_Event_started_tag:

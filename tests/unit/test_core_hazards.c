@@ -329,6 +329,45 @@ static void a_start_that_is_refused_forgets_no_shot(void **state)
     bench_destroy(b);
 }
 
+static void a_stop_that_is_pressed_at_the_start_stands(void **state)
+{
+    (void)state;
+    struct bench *b = create("bar2", NULL);
+    b->inputs[BOARD_IN_ESTOP] = true; /* no edge that anybody saw */
+    host_board_reset(b->board, BOARD_RESET_PIN);
+    bench_run(b, 1);
+    assert_int_equal(b->core->state, lumi_wire_State_STOPPED_LOST);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(home, 0)), lumi_wire_Result_REFUSED);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_REFUSED);
+    bench_set_input(b, BOARD_IN_ESTOP, false);
+    bench_run(b, 0.1);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_DONE);
+    bench_home(b);
+    bench_destroy(b);
+}
+
+static void ramping_under_a_driver_that_failed(struct lumi_rig *rig)
+{
+    rig->control.safety.driver_fault_fitted = true;
+    rig->control.safety.reactions[LUMI_RIG_FAULT_DRIVER].motor = LUMI_RIG_MOTOR_RAMP;
+}
+
+static void a_driver_that_failed_leaves_the_position_unknown(void **state)
+{
+    (void)state;
+    for (int moving = 0; moving < 2; moving++) {
+        struct bench *b = create("arc16", ramping_under_a_driver_that_failed);
+        bench_home(b);
+        if (moving) {
+            assert_int_equal(bench_ask(b, BENCH_REQUEST(jog, .turns = 1)), lumi_wire_Result_DONE);
+            bench_run(b, 2);
+        }
+        bench_set_input(b, BOARD_IN_DRIVER_FAULT, true);
+        bench_until(b, lumi_wire_State_STOPPED_LOST, 5);
+        bench_destroy(b);
+    }
+}
+
 static void driven_from_outside(struct lumi_rig *rig)
 {
     rig->control.motion.drive = LUMI_RIG_DRIVE_EXTERNAL;
@@ -387,6 +426,76 @@ static void lines_fall_in_the_emergency_stops_interrupt(void **state)
     bench_destroy(b);
 }
 
+static void finishing_under_a_driver_that_failed(struct lumi_rig *rig)
+{
+    rig->control.safety.driver_fault_fitted = true;
+    rig->control.safety.reactions[LUMI_RIG_FAULT_DRIVER].triggers = LUMI_RIG_TRIGGERS_FINISH;
+}
+
+static void a_shot_that_is_finished_while_the_motor_halted_under_it_is_lost(void **state)
+{
+    struct lumi_plan plan;
+
+    (void)state;
+    struct bench *b = create("arc16", finishing_under_a_driver_that_failed);
+    bench_home(b);
+    lumi_plan_init(&plan, &b->rig);
+    uint32_t crc = start(b, &plan);
+    bench_until(b, lumi_wire_State_SWEEPING, 30);
+    bench_run(b, 5);
+    while (b->lines == 0)
+        host_board_run(b->board, host_board_now(b->board) + BENCH_SECOND / 1000);
+    bench_set_input(b, BOARD_IN_DRIVER_FAULT, true);
+    bench_run(b, 1);
+    assert_int_equal(b->core->state, lumi_wire_State_STOPPED_LOST);
+    assert_int_equal(b->lost, 1);
+    bench_set_input(b, BOARD_IN_DRIVER_FAULT, false);
+    recover(b, b->faults_set, crc, 72);
+    bench_destroy(b);
+}
+
+/* From the step before the first trigger backwards: how many rise. */
+static int risen_before_first_trigger(const struct bench *b)
+{
+    int edge = 0, last = 0, first;
+
+    while (b->edges[edge].rise == 0)
+        edge++;
+    while (last + 1 < b->step_count && b->step_at[last + 1] < b->edges[edge].at)
+        last++;
+    for (first = last; first > 0 && b->step_position[first] > b->step_position[first - 1];)
+        first--;
+    return last - first;
+}
+
+static void every_beginning_takes_up_the_backlash(void **state)
+{
+    struct lumi_plan plan;
+
+    (void)state;
+    for (int mode = LUMI_PLAN_CONTINUOUS; mode <= LUMI_PLAN_START_STOP; mode++) {
+        struct bench *b = create("arc16", NULL);
+        const double backlash = b->rig.control.motion.backlash / (2 * LUMI_PI) * b->steps_per_turn;
+        bench_home(b);
+        lumi_plan_init(&plan, &b->rig);
+        plan.mode = (enum lumi_plan_mode)mode;
+        plan.turn_time = 60;
+        b->edge_count = b->step_count = 0;
+        uint32_t crc = start(b, &plan);
+        bench_until(b, lumi_wire_State_SWEEPING, 30);
+        bench_run(b, 20);
+        assert_true(backlash > 1 && risen_before_first_trigger(b) >= backlash);
+        assert_int_equal(bench_ask(b, BENCH_REQUEST(pause, 0)), lumi_wire_Result_DONE);
+        bench_until(b, lumi_wire_State_PAUSED, 10);
+        b->edge_count = b->step_count = 0;
+        assert_int_equal(bench_ask(b, BENCH_REQUEST(start_sweep, .plan_crc = crc, .only_missing = true)),
+                         lumi_wire_Result_DONE);
+        bench_until(b, lumi_wire_State_IDLE, 90);
+        assert_true(risen_before_first_trigger(b) >= backlash);
+        bench_destroy(b);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -400,9 +509,13 @@ int main(void)
         cmocka_unit_test(a_turn_that_was_told_wrong_does_not_tear_the_string),
         cmocka_unit_test(no_jog_goes_beyond_the_string),
         cmocka_unit_test(a_start_that_is_refused_forgets_no_shot),
+        cmocka_unit_test(a_stop_that_is_pressed_at_the_start_stands),
+        cmocka_unit_test(a_driver_that_failed_leaves_the_position_unknown),
         cmocka_unit_test(an_external_drive_stands_while_flash_is_written),
         cmocka_unit_test(an_external_drive_on_a_string_wants_a_brake),
         cmocka_unit_test(lines_fall_in_the_emergency_stops_interrupt),
+        cmocka_unit_test(a_shot_that_is_finished_while_the_motor_halted_under_it_is_lost),
+        cmocka_unit_test(every_beginning_takes_up_the_backlash),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -249,6 +249,9 @@ static void a_lost_host_ends_the_row_and_the_sweep_goes_on_later(void **state)
     bench_until(b, lumi_wire_State_IDLE, 100);
     each_shot_was_fired_once(b, 216);
     assert_int_equal(b->turn_marks, 3);
+    assert_int_equal(b->turn_mark.turn, 2);
+    assert_int_equal(b->turn_mark.step, llround(2 * b->steps_per_turn));
+    assert_true(fabs(b->turn_mark.pitch - lumi_rig_drop(&b->rig, 2)) < 1e-6);
     bench_destroy(b);
 }
 

@@ -28,6 +28,7 @@ struct port {
         uint32_t shot;
     } stamps[8];
     int stamp_count;
+    int stop_at; /* everything is stopped by an interrupt just before so many locks more; 0: never */
     struct board board;
     struct firing firing;
     struct firing_edge edges[FIRING_EDGES];
@@ -42,7 +43,10 @@ static uint64_t port_now(void *port)
 
 static unsigned port_lock(void *port)
 {
-    (void)port;
+    struct port *p = port;
+
+    if (p->stop_at > 0 && --p->stop_at == 0)
+        firing_stop(&p->firing, false);
     return 0;
 }
 
@@ -350,6 +354,28 @@ static void stopping_at_once_drops_all_lines_and_tells_what_was_lost(void **stat
     assert_int_equal(p.records[1].state, SHOT_LOST);
 }
 
+/* Whatever a shot's queueing has come to: no line goes up after the stop, and the shot is planned, or lost and told. */
+static void a_stop_in_the_middle_of_queueing_leaves_nothing_behind(void **state)
+{
+    struct port p;
+
+    (void)state;
+    for (int n = 1; n <= 8; n++) {
+        begin(&p, 4);
+        assert_true(firing_shoot(&p.firing, 0, 0, p.now + 100 * MS, 0));
+        p.stop_at = n;
+        assert_false(firing_shoot(&p.firing, 1, 0, p.now + 300 * MS, 0));
+        assert_int_equal(p.stop_at, 0);
+        run(&p, p.now + 1000 * MS);
+        assert_int_equal(p.out_count, 0);
+        assert_false(firing_busy_now(&p.firing));
+        assert_int_equal(p.record_count, 0);
+        assert_int_equal(firing_state(&p.firing, 0), SHOT_PLANNED);
+        assert_int_equal(firing_state(&p.firing, 1), SHOT_PLANNED);
+        assert_false(firing_record(&p.firing, &p.rig, 0, true, p.now + 10 * MS)); /* not before firing_release */
+    }
+}
+
 static void feedback_is_stamped_and_belongs_to_its_shot(void **state)
 {
     struct port p;
@@ -456,6 +482,7 @@ int main(void)
         cmocka_unit_test(a_late_edge_loses_its_shot),
         cmocka_unit_test(stopping_finishes_what_has_begun_and_plans_the_rest_again),
         cmocka_unit_test(stopping_at_once_drops_all_lines_and_tells_what_was_lost),
+        cmocka_unit_test(a_stop_in_the_middle_of_queueing_leaves_nothing_behind),
         cmocka_unit_test(feedback_is_stamped_and_belongs_to_its_shot),
         cmocka_unit_test(recording_is_a_pulse_or_held),
         cmocka_unit_test(an_exposure_of_a_minute_is_as_long),

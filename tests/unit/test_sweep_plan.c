@@ -332,7 +332,7 @@ static void a_move_takes_the_time_that_its_phases_take(void **state)
     }
 }
 
-static void the_run_up_is_ramp_and_margin_or_the_backlash(void **state)
+static void the_run_up_is_ramp_backlash_and_margin(void **state)
 {
     struct lumi_rig rig = builtin("bar2");
     struct lumi_plan plan = plan_for(&rig);
@@ -340,16 +340,17 @@ static void the_run_up_is_ramp_and_margin_or_the_backlash(void **state)
 
     (void)state;
     double v = lumi_plan_speed(&plan), ramp = lumi_ramp_distance(v, m->acceleration_max, m->jerk_max);
-    double held = v * (LUMI_PLAN_CRUISE_MARGIN + plan.exposures[0] / 2);
+    double held = v * (LUMI_PLAN_CRUISE_MARGIN + plan.exposures[0] / 2), swing = v * LUMI_PLAN_SWING_MARGIN;
+    double play = rig.control.motion.backlash;
     assert_true(fabs(v - 2 * LUMI_PI / 30) < 1e-12);
-    assert_true(fabs(lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI - ramp - held) < 1e-9);
+    assert_true(fabs(lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI - ramp - play - swing - held) < 1e-9);
     assert_true(fabs(lumi_plan_run_down(&plan, &rig) * 2 * LUMI_PI - ramp - held) < 1e-9);
     assert_true(fabs(lumi_plan_span(&plan) - (18 - 1 / 72.0)) < 1e-12);
     double seconds = lumi_plan_seconds(&plan, &rig);
     rig.control.motion.backlash = 0.2;
-    assert_true(fabs(lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI - 0.2 - held) < 1e-9);
+    assert_true(fabs(lumi_plan_run_up(&plan, &rig) * 2 * LUMI_PI - ramp - 0.2 - swing - held) < 1e-9);
     assert_true(fabs(lumi_plan_run_down(&plan, &rig) * 2 * LUMI_PI - ramp - held) < 1e-9);
-    assert_true(fabs(lumi_plan_seconds(&plan, &rig) - seconds - (0.2 - ramp) / v) < 1e-9);
+    assert_true(fabs(lumi_plan_seconds(&plan, &rig) - seconds - (0.2 - play) / v) < 1e-9);
 }
 
 /* A position is ready when the cameras' lines have had their lead, and over when the last of them has fallen. */
@@ -511,7 +512,7 @@ int main(void)
         cmocka_unit_test(numbers_that_cannot_be_are_refused),
         cmocka_unit_test(positions_of_a_plan_fall_on_the_nearest_step_without_drift),
         cmocka_unit_test(a_move_takes_the_time_that_its_phases_take),
-        cmocka_unit_test(the_run_up_is_ramp_and_margin_or_the_backlash),
+        cmocka_unit_test(the_run_up_is_ramp_backlash_and_margin),
         cmocka_unit_test(focus_lines_and_long_pulses_take_their_time_at_a_position),
         cmocka_unit_test(a_plan_that_is_printed_parses_to_the_same_numbers),
         cmocka_unit_test(all_cameras_can_be_named_in_one_line),
