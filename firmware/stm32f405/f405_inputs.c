@@ -20,12 +20,13 @@ void inputs_init(void)
     SYSCFG_EXTICR(0) = SYSCFG_EXTICR_PC * 0x1111u;                     /* EXTI0 … 3 */
     SYSCFG_EXTICR(1) = SYSCFG_EXTICR_PC;                               /* EXTI4 */
     SYSCFG_EXTICR(2) = SYSCFG_EXTICR_PC << 8 | SYSCFG_EXTICR_PC << 12; /* EXTI10, 11 */
-    EXTI_RTSR = LINES;
+    EXTI_RTSR = LINES | 1u << EXTI_LINE_PVD;
     EXTI_FTSR = LINES;
-    EXTI_PR = LINES;
-    EXTI_IMR = LINES;
+    EXTI_PR = LINES | 1u << EXTI_LINE_PVD;
+    EXTI_IMR = LINES | 1u << EXTI_LINE_PVD;
     SCB_SHPR_BYTE(EXCEPTION_PENDSV - 4) = PRIORITY_CORE << 4;
     interrupt_enable(IRQ_EXTI0, PRIORITY_ESTOP);
+    interrupt_enable(IRQ_PVD, PRIORITY_ESTOP);
     for (unsigned irq = IRQ_EXTI1; irq <= IRQ_EXTI4; irq++)
         interrupt_enable(irq, PRIORITY_CORE);
     interrupt_enable(IRQ_EXTI15_10, PRIORITY_CORE);
@@ -43,6 +44,13 @@ void inputs_init(void)
     for (int i = 0; i < 4; i++)
         inputs.feedback |= (uint32_t)pin_feedback(i) << i;
     interrupt_enable(IRQ_TIM3, PRIORITY_CORE);
+}
+
+/* The chip's own supply sinks: below 2.7 V five wait states are too few (RM0090 section 3.5.1, table 10), and what is
+ * fetched may be anything. */
+void PVD_Handler(void)
+{
+    panic();
 }
 
 /* Above all others and above every lock. A press stops the steps here and now; the core hears of it, and of a release,

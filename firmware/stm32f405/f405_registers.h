@@ -29,6 +29,8 @@
 
 /* PWR, section 5.4.1 */
 #define PWR_CR REG32(PWR_BASE + 0x00)
+#define PWR_CR_PVDE (1u << 4)
+#define PWR_CR_PLS_2V8 (6u << 5)
 #define PWR_CR_VOS (1u << 14) /* scale 1, for 168 MHz */
 
 /* RCC, section 7.3 */
@@ -139,6 +141,7 @@
 #define EXTI_RTSR REG32(EXTI_BASE + 0x08)
 #define EXTI_FTSR REG32(EXTI_BASE + 0x0c)
 #define EXTI_PR REG32(EXTI_BASE + 0x14)
+#define EXTI_LINE_PVD 16
 
 /* TIM2 … TIM5, section 18.4 */
 #define TIM_CR1(base) REG32((base) + 0x00)
@@ -265,6 +268,7 @@
 #define EXCEPTION_SYSTICK 15
 
 /* RM0090 section 12.2, table 62: positions of the interrupts */
+#define IRQ_PVD 1
 #define IRQ_EXTI0 6
 #define IRQ_EXTI1 7
 #define IRQ_EXTI2 8

@@ -44,6 +44,7 @@ void system_init(void)
 {
     cause = RCC_CSR;
     RCC_CSR = RCC_CSR_RMVF;
+    PWR_CR = PWR_CR_VOS | PWR_CR_PLS_2V8 | PWR_CR_PVDE; /* section 5.2.3; it interrupts from inputs_init on */
     supply_init();
     if (!ON_QEMU)
         watchdog_init();

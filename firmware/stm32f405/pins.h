@@ -50,7 +50,7 @@
 /* Interrupt priorities, 0 is the most urgent (NVIC, 4 bits: RM0090 rev 19, section 12.1; PM0214 section 4.4). lock()
  * holds off PRIORITY_CORE and everything below it: what stops the steps and what puts trigger edges out is never held
  * off, and neither calls the core. All of the core's interrupt entries have one priority and so never nest. */
-#define PRIORITY_ESTOP 0 /* EXTI0: stops TIM2 in hardware, then asks PendSV to tell the core */
+#define PRIORITY_ESTOP 0 /* EXTI0: stops TIM2 in hardware, then asks PendSV to tell the core; PVD */
 #define PRIORITY_EDGE 1  /* TIM5: trigger edges to the tick, wrap of the clock; PendSV tells the core */
 #define PRIORITY_CORE 2  /* TIM2, TIM3, EXTI1–4, EXTI15_10, PendSV: everything that calls core_on_… */
 #define PRIORITY_LINK 3  /* USART2, DMA1 stream 6, OTG_FS */

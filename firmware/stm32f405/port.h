@@ -88,6 +88,7 @@ extern struct core *const the_core;
 /* Interrupts; what each is for stands with its priority in pins.h. */
 void PendSV_Handler(void);
 void SysTick_Handler(void);
+void PVD_Handler(void);
 void EXTI0_Handler(void);
 void EXTI1_Handler(void);
 void EXTI2_Handler(void);

@@ -196,6 +196,7 @@ static void exti_lines(struct f405 *chip)
 {
     const struct exti *e = &chip->exti;
     uint32_t active = e->pr & e->imr;
+    f405_cpu_irq(chip, 1, active & 1u << 16); /* PVD */
     for (int i = 0; i < 5; i++)
         f405_cpu_irq(chip, 6 + i, active >> i & 1);
     f405_cpu_irq(chip, 23, active & 0x03e0);

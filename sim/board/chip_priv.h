@@ -161,6 +161,7 @@ struct f405 {
     struct adc adc;
     struct watchdog watchdog;
     struct otg otg;
+    unsigned sunk; /* mV below 3,300 of the chip's supply */
     uint32_t pwr_cr, dbgmcu[4], rng_cr, crc, adc_ccr;
 };
 

@@ -184,11 +184,27 @@ bool f405_rcc_access(struct f405 *chip, int index, uint32_t offset, bool write, 
     return true;
 }
 
+/* 5.4.1: what PLS says, in mV; the detector's output is high below. */
+static bool sunk(const struct f405 *chip)
+{
+    static const uint16_t threshold[8] = {2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900};
+    return chip->pwr_cr & 1u << 4 && 3300 - chip->sunk < threshold[bits(chip->pwr_cr, 5, 3)];
+}
+
+void f405_set_supply(struct f405 *chip, unsigned millivolts)
+{
+    const bool before = sunk(chip);
+    chip->sunk = 3300 - millivolts;
+    if (sunk(chip) != before)
+        f405_exti_edge(chip, 16, !before); /* 12.2.5 */
+    f405_schedule(chip);
+}
+
 bool f405_pwr_access(struct f405 *chip, int index, uint32_t offset, bool write, uint32_t *value)
 {
     (void)index;
-    if (offset == 4) { /* CSR: VOSRDY */
-        *value = 1u << 14;
+    if (offset == 4) { /* CSR: VOSRDY, PVDO */
+        *value = 1u << 14 | (uint32_t)sunk(chip) << 2;
         return true;
     }
     if (offset)

@@ -85,6 +85,9 @@ void f405_clear_stats(struct f405 *chip);
 /* The crystal breaks, or swings again. */
 void f405_set_crystal(struct f405 *chip, bool works);
 
+/* The chip's supply; 3,300 mV from its creation on. */
+void f405_set_supply(struct f405 *chip, unsigned millivolts);
+
 /* The outside drives a pin or lets go of it, now. */
 void f405_drive(struct f405 *chip, int pin, enum f405_level level);
 /* What the chip drives it with. */

@@ -115,6 +115,16 @@ static void a_cleared_halt_begins_with_data0(struct board_fixture *f, uint16_t e
     assert_int_equal(board_client_wire(f->client)->retries, 0);
 }
 
+static void so_does_a_configuration(struct board_fixture *f)
+{
+    write_part(f, 4);
+    assert_int_equal(usb_control(f->machine, 0x00, 9, 1, 0, NULL, 0, NULL), USB_DONE);
+    usb_host_clear_toggle(f405_machine_usb(f->machine), LUMI_WIRE_USB_OUT);
+    usb_host_clear_toggle(f405_machine_usb(f->machine), LUMI_WIRE_USB_IN);
+    write_part(f, 4);
+    assert_int_equal(board_client_wire(f->client)->retries, 0);
+}
+
 static void a_halted_endpoint_stalls_until_it_is_cleared(void **state)
 {
     struct board_fixture f;
@@ -135,6 +145,8 @@ static void a_halted_endpoint_stalls_until_it_is_cleared(void **state)
     BOARD_OK(board_client_open(f.client, 3, error));
     for (int i = 0; i < 6; i++)
         a_cleared_halt_begins_with_data0(&f, i & 1 ? LUMI_WIRE_USB_IN : LUMI_WIRE_USB_OUT);
+    for (int i = 0; i < 3; i++)
+        so_does_a_configuration(&f);
     board_fixture_finish(&f);
 }
 

@@ -313,6 +313,26 @@ static void a_pulse_that_was_missed_stops_all_of_them(void **state)
     restarted(resets, WATCHDOG);
 }
 
+static void a_supply_that_sinks_stops_all_pulses_before_the_flash_fails(void **state)
+{
+    (void)state;
+    bench.moved = 0;
+    forget();
+    const uint32_t resets = f405_resets(bench.chip);
+    command(MOVE, 100000, 840, 420, 0);
+    f405_set_supply(bench.chip, 2850);
+    run(0.01);
+    const int running = bench.rise_count;
+    f405_set_supply(bench.chip, 2750);
+    run(0.0001);
+    const int risen = bench.rise_count;
+    run(0.01);
+    assert_true(running > 500);
+    assert_int_equal(bench.rise_count, risen);
+    f405_set_supply(bench.chip, 3300);
+    restarted(resets, WATCHDOG);
+}
+
 static void a_crystal_that_breaks_ends_the_steps_and_the_light_says_so(void **state)
 {
     (void)state;
@@ -347,6 +367,7 @@ int main(void)
         cmocka_unit_test(a_start_moves_nothing_and_opens_nothing),
         cmocka_unit_test(a_main_loop_that_hangs_is_ended_by_the_watchdog),
         cmocka_unit_test(a_pulse_that_was_missed_stops_all_of_them),
+        cmocka_unit_test(a_supply_that_sinks_stops_all_pulses_before_the_flash_fails),
         cmocka_unit_test(a_crystal_that_breaks_ends_the_steps_and_the_light_says_so),
         /* It leaves triggers under way. */
         cmocka_unit_test(trigger_edges_are_at_their_ticks_while_steps_are_made),
