@@ -94,8 +94,6 @@ static void print_json(const struct lumi_rig_link_snapshot *link, const lumi_wir
     add_status(builder, status);
     if (link->clock_matched) {
         add_int(builder, "clock_offset_ns", link->clock_offset_ns);
-        add_double(builder, "clock_drift_ppm", link->clock_drift_ppm);
-        add_double(builder, "clock_residual_ns", link->clock_residual_ns);
         add_double(builder, "round_trip_ns", link->round_trip_ns);
     }
     json_builder_end_object(builder);

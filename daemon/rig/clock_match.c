@@ -104,7 +104,8 @@ static void fit(struct lumi_clock_match *match)
     }
     span = points[0].host - points[count - 1].host;
     match->drift = 0;
-    if (count >= 3 && span >= DRIFT_SPAN_NS && hh > 0)
+    match->drift_known = count >= 3 && span >= DRIFT_SPAN_NS && hh > 0;
+    if (match->drift_known)
         match->drift = fmax(fmin(ho / hh, LUMI_CLOCK_DRIFT_MAX), -LUMI_CLOCK_DRIFT_MAX);
     for (int i = 0; i < count; i++) {
         double miss = points[i].offset - offset - match->drift * (points[i].host - host);

@@ -26,6 +26,7 @@ struct lumi_clock_match {
     /* The line: board = board_at + (host − host_at) · (1 + drift). */
     uint64_t host_at, board_at;
     double drift;
+    bool drift_known;     /* two seconds of round trips; before, drift and residual are 0 */
     double residual_ns;   /* root of the weighted mean square */
     double round_trip_ns; /* the quickest: half of it bounds the error of the offset that no fit can see */
 };

@@ -11,7 +11,8 @@ enum kind { NAME, INTEGER, REAL, WORD_ORDER, TABLE, WIDTH, BIT, MULTIPLIER };
 enum section { DRIVE, SCALE, STATUS, POSITION, FAULT_CODE, TARGET, SPEED, START, STOP, RESET, HOME, SECTIONS };
 static const char *const section_names[SECTIONS] = {"drive", "scale", "status", "position", "fault-code", "target",
                                                     "speed", "start", "stop",   "reset",    "home"};
-static const bool wanted[SECTIONS] = {[DRIVE] = true, [SCALE] = true, [STATUS] = true, [TARGET] = true, [START] = true};
+static const bool wanted[SECTIONS] = {
+    [DRIVE] = true, [SCALE] = true, [STATUS] = true, [POSITION] = true, [TARGET] = true, [START] = true};
 
 #define MAP(member) offsetof(struct lumi_drive_map, member)
 #define REGISTER(s, m)                                                                                                 \

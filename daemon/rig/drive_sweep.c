@@ -13,6 +13,7 @@
 #define ASK_SECONDS 0.02    /* between two looks at a drive that moves */
 #define ENABLE_SECONDS 2.0  /* from the enable line to the drive's word that it is enabled */
 #define ANSWER_SECONDS 3.0  /* of the board */
+#define BEGUN_SECONDS 1.0   /* a drive that is told to home has begun by then: "homed" from before is gone */
 #define REACHED_SECONDS 2.0 /* the board waits for the line after the drive has said that it stands */
 
 struct watch {
@@ -105,14 +106,17 @@ static bool there(struct lumi_rig_drive_sweep *sweep, const struct lumi_rig_driv
 static int wait_for_drive(struct watch *watch, double turns, double seconds, struct lumi_error *error)
 {
     struct lumi_rig_drive_sweep *sweep = watch->sweep;
-    uint64_t deadline = seconds_from_now(seconds);
+    uint64_t deadline = seconds_from_now(seconds), begun = seconds_from_now(BEGUN_SECONDS);
     struct lumi_rig_drive_status status;
 
     for (;;) {
         LUMI_TRY(judge(watch, error));
         LUMI_TRY(lumi_rig_drive_status(sweep->drive, &status, error));
         LUMI_TRY(judge_drive(sweep, &status, error));
-        if (isnan(turns) ? status.homed && status.reached : there(sweep, &status, turns))
+        bool rests = isnan(turns) ? status.homed && status.reached : there(sweep, &status, turns);
+        if (!rests)
+            begun = 0;
+        if (rests && (!isnan(turns) || lumi_rig_link_now() >= begun))
             return LUMI_OK;
         if (lumi_rig_link_now() >= deadline)
             break;

@@ -163,11 +163,20 @@ static int run_dfu_util(const struct lumi_rig_flash *flash, struct lumi_error *e
                          "flash --in-loader. %s",
                          flash->program, flash->loader_seconds, tail.text);
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-        return lumi_fail(error, LUMI_ERR_IO, "%s failed: %s", flash->program, tail.text);
+        return lumi_fail(error, LUMI_ERR_IO, "%s failed; the board waits in its loader: run flash --in-loader. %s",
+                         flash->program, tail.text);
     return LUMI_OK;
 }
 
 /* ---- the board ---- */
+
+/* Before the board goes to its loader, where nothing else can be done with it. */
+static int find_program(const struct lumi_rig_flash *flash, struct lumi_error *error)
+{
+    g_autofree char *path = g_find_program_in_path(flash->program);
+
+    return path ? LUMI_OK : lumi_fail(error, LUMI_ERR_IO, "%s is not installed (package dfu-util)", flash->program);
+}
 
 void lumi_rig_flash_init(struct lumi_rig_flash *flash)
 {
@@ -231,6 +240,7 @@ int lumi_rig_flash(struct lumi_rig_flash *flash, struct lumi_error *error)
                                 error);
     lumi_free(data);
     LUMI_TRY(code);
+    LUMI_TRY(find_program(flash, error));
     if (flash->link) {
         say(flash, "entering the loader");
         LUMI_TRY(enter_loader(flash, error));

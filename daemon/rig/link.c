@@ -310,6 +310,7 @@ void lumi_rig_link_snapshot(struct lumi_rig_link *link, struct lumi_rig_link_sna
     snapshot->clock_matched = lumi_clock_matched(&link->clock);
     if (snapshot->clock_matched) {
         snapshot->clock_offset_ns = (int64_t)(lumi_clock_to_board(&link->clock, now) - now);
+        snapshot->clock_drift_known = link->clock.drift_known;
         snapshot->clock_drift_ppm = link->clock.drift * 1e6;
         snapshot->clock_residual_ns = link->clock.residual_ns;
         snapshot->round_trip_ns = link->clock.round_trip_ns;

@@ -97,8 +97,8 @@ struct lumi_rig_link_snapshot {
     lumi_wire_Status status; /* of the last heartbeat */
     uint64_t status_ns;      /* CLOCK_MONOTONIC when it came; of the board's clock: */
     uint64_t status_board_ns;
-    bool clock_matched;
-    int64_t clock_offset_ns; /* board less host, now */
+    bool clock_matched, clock_drift_known; /* the drift and the residual want some seconds */
+    int64_t clock_offset_ns;               /* board less host, now */
     double clock_drift_ppm, clock_residual_ns, round_trip_ns;
     uint32_t reconnections, restarts, retries, duplicates, damaged; /* since it was opened */
     uint32_t requests_lost;

@@ -6,6 +6,8 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <glib.h>
+#include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -193,5 +195,20 @@ int lumi_rig_sweep_log_shot(struct lumi_rig_sweep_log *log, uint32_t shot, uint3
 
     if (shot < LUMI_PLAN_SHOTS_MAX)
         log->fired[shot / 8] |= (uint8_t)(1u << shot % 8);
+    return append(log, line, (size_t)size, error);
+}
+
+int lumi_rig_sweep_log_clock(struct lumi_rig_sweep_log *log, const struct lumi_rig_link_snapshot *link,
+                             struct lumi_error *error)
+{
+    char line[256];
+    int size = snprintf(line, sizeof line - 1,
+                        "{\"boot\":%u,\"clock_offset_ns\":%" PRId64 ",\"clock_drift_ppb\":%lld,"
+                        "\"clock_residual_ns\":%lld,\"round_trip_ns\":%lld}",
+                        (unsigned)link->welcome.boot, link->clock_offset_ns, llround(link->clock_drift_ppm * 1e3),
+                        llround(link->clock_residual_ns), llround(link->round_trip_ns));
+
+    if (!link->clock_matched || !link->clock_drift_known)
+        return LUMI_OK;
     return append(log, line, (size_t)size, error);
 }

@@ -28,6 +28,9 @@ int lumi_rig_sweep_log_notice(struct lumi_rig_sweep_log *log, const struct lumi_
                               const struct lumi_rig_json_clock *clock, struct lumi_error *error);
 /* A shot whose event was lost: the board's map says that it was fired. */
 int lumi_rig_sweep_log_shot(struct lumi_rig_sweep_log *log, uint32_t shot, uint32_t boot, struct lumi_error *error);
+/* How the clocks stood to one another when the sweep had ended. */
+int lumi_rig_sweep_log_clock(struct lumi_rig_sweep_log *log, const struct lumi_rig_link_snapshot *link,
+                             struct lumi_error *error);
 bool lumi_rig_sweep_log_has(const struct lumi_rig_sweep_log *log, uint32_t shot);
 
 /* One line of a log, for what has to be known of it again; hostile text is fine. */

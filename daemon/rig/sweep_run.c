@@ -412,12 +412,16 @@ static void await_events(struct course *course, uint32_t next)
 static int account(struct course *course, struct lumi_error *error)
 {
     struct lumi_rig_sweep_run *run = course->run;
+    struct lumi_rig_link_snapshot snapshot;
     uint8_t *states = course->states;
     lumi_wire_Status status;
     char missing[200];
 
     LUMI_TRY(lumi_rig_bench_status(run->link, &status, error));
     await_events(course, status.events_next);
+    lumi_rig_link_snapshot(run->link, &snapshot);
+    if (run->log && run->ended && course->begun)
+        LUMI_TRY(lumi_rig_sweep_log_clock(run->log, &snapshot, error));
     LUMI_TRY(lumi_rig_read_shots(run->link, run->shots, states, error));
     run->fired = run->lost = 0;
     for (uint32_t shot = 0; shot < run->shots; shot++) {

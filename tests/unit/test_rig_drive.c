@@ -208,6 +208,7 @@ static void maps_that_cannot_be_are_refused_with_their_line(void **state)
         {"width = 32\n[speed]", "width = 24\n[speed]", "16 or 32"},
         {"width = 32\n[speed]", "table = input\n[speed]", "cannot be"},
         {"[start]\naddress = 12\nvalue = 1\nclear = 0\n", "", "[start] is missing"},
+        {"[position]\naddress = 2\nwidth = 32\n", "", "[position] is missing"},
         {"value = 0xff", "value = 0x1ff00", "from 0 to 65535"},
         {"value = 0xff", "value", "neither"},
         {"[drive]\n", "", "before the first section"},

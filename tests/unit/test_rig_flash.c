@@ -212,7 +212,7 @@ static void a_writing_program_that_hangs_is_ended(void **state)
     assert_non_null(strstr(error.text, "not installed"));
 }
 
-static void nothing_is_flashed_while_the_rig_moves(void **state)
+static void nothing_is_flashed_while_the_rig_moves_or_without_the_program(void **state)
 {
     struct lumi_rig_flash moving;
     struct lumi_error error = {0};
@@ -230,6 +230,13 @@ static void nothing_is_flashed_while_the_rig_moves(void **state)
     assert_int_equal(lumi_rig_link_wait(moving.link, 20, false, &error), LUMI_OK);
     assert_int_equal(lumi_rig_flash(&moving, &error), LUMI_ERR_BUSY);
     assert_non_null(strstr(error.text, "sweeping"));
+    assert_false(entered);
+    pthread_mutex_lock(&board.lock);
+    board.status.state = lumi_wire_State_IDLE;
+    pthread_mutex_unlock(&board.lock);
+    moving.program = "lumi-no-such-program"; /* known before the board is in its loader */
+    assert_int_equal(lumi_rig_flash(&moving, &error), LUMI_ERR_IO);
+    assert_non_null(strstr(error.text, "not installed"));
     assert_false(entered);
     lumi_rig_link_close(moving.link);
     fake_board_stop(&board);
@@ -263,7 +270,7 @@ int main(void)
         cmocka_unit_test(a_board_that_comes_back_with_another_version_is_told),
         cmocka_unit_test(what_the_writing_program_says_is_passed_on),
         cmocka_unit_test(a_writing_program_that_hangs_is_ended),
-        cmocka_unit_test(nothing_is_flashed_while_the_rig_moves),
+        cmocka_unit_test(nothing_is_flashed_while_the_rig_moves_or_without_the_program),
     };
 
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

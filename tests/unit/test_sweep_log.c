@@ -181,6 +181,34 @@ static void a_log_in_which_nothing_came_to_stand_goes_again(void **state)
     assert_int_equal(access(path, F_OK), 0);
 }
 
+static void how_the_clocks_stood_is_written_when_it_is_known(void **state)
+{
+    struct lumi_rig_link_snapshot link = {.clock_matched = true,
+                                          .clock_offset_ns = -29248636439,
+                                          .clock_drift_ppm = -12.3456,
+                                          .clock_residual_ns = 4711.2,
+                                          .round_trip_ns = 1e6};
+    struct lumi_rig_sweep_log log;
+    struct lumi_error error = {0};
+    uint8_t *text;
+    size_t size;
+
+    (void)state;
+    link.welcome.boot = 7;
+    write_log(1);
+    int before = count_lines();
+    assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_OK);
+    assert_int_equal(lumi_rig_sweep_log_clock(&log, &link, &error), LUMI_OK); /* too young to tell */
+    link.clock_drift_known = true;
+    assert_int_equal(lumi_rig_sweep_log_clock(&log, &link, &error), LUMI_OK);
+    assert_int_equal(lumi_rig_sweep_log_close(&log, &error), LUMI_OK);
+    assert_int_equal(count_lines(), before + 1);
+    assert_int_equal(lumi_file_read(path, 1 << 20, &text, &size, &error), LUMI_OK);
+    assert_non_null(strstr((char *)text, "{\"boot\":7,\"clock_offset_ns\":-29248636439,\"clock_drift_ppb\":-12346,"
+                                         "\"clock_residual_ns\":4711,\"round_trip_ns\":1000000}\n"));
+    lumi_free(text);
+}
+
 static void missing_shots_are_named_as_ranges(void **state)
 {
     uint8_t states[300];
@@ -228,6 +256,7 @@ int main(void)
         cmocka_unit_test(a_torn_line_is_dropped),
         cmocka_unit_test(other_files_are_not_gone_on_with),
         cmocka_unit_test(a_log_in_which_nothing_came_to_stand_goes_again),
+        cmocka_unit_test(how_the_clocks_stood_is_written_when_it_is_known),
         cmocka_unit_test(missing_shots_are_named_as_ranges),
     };
 
