@@ -60,7 +60,7 @@ struct sweep {
 
 /* Begins: NULL, or why not. The state must allow it. */
 const char *sweep_begin(struct core *core, uint32_t first_shot, bool only_missing);
-/* External drive: one bracket. */
+/* External drive: what has not been fired of one bracket. */
 const char *sweep_fire_here(struct core *core, uint32_t first_shot, double timeout);
 void sweep_poll(struct core *core);
 uint64_t sweep_next_poll(const struct core *core);

@@ -211,10 +211,18 @@ const char *sweep_fire_here(struct core *core, uint32_t first_shot, double timeo
         return "no position of the plan begins with this shot";
     if (!(timeout >= 0 && timeout <= 3600))
         return "the time to wait is out of range";
+    const uint32_t end = first_shot + (uint32_t)core->plan.bracket;
+    uint32_t shot = first_shot; /* what has been fired of it stays: MarkShots plans it again */
+    while (shot < end && firing_state(&core->firing, shot) == SHOT_FIRED)
+        shot++;
+    if (shot == end)
+        return "every shot of this position has been fired";
     firing_begin(&core->firing, &core->rig, &core->plan);
-    firing_plan_again(&core->firing, first_shot, (uint32_t)core->plan.bracket);
-    *s = (struct sweep){.active = true, .external = true, .phase = SWEEP_REACH, .exposure = -1, .shot = first_shot};
-    s->end = first_shot + (uint32_t)core->plan.bracket;
+    for (uint32_t i = shot; i < end; i++)
+        if (firing_state(&core->firing, i) == SHOT_LOST)
+            firing_plan_again(&core->firing, i, 1);
+    *s = (struct sweep){.active = true, .external = true, .phase = SWEEP_REACH, .exposure = -1, .shot = shot};
+    s->end = end;
     s->how = lumi_wire_SweepEnded_How_COMPLETE;
     s->until = core->now + CORE_SECONDS(timeout);
     motion_set_position(&core->motion, stand(core, first_shot));

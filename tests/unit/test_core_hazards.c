@@ -390,6 +390,42 @@ static void an_external_drive_stands_while_flash_is_written(void **state)
     bench_destroy(b);
 }
 
+static void an_external_drives_position_is_finished_and_nothing_taken_twice(void **state)
+{
+    struct lumi_plan plan;
+
+    (void)state;
+    struct bench *b = create("arc16", driven_from_outside);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(home, 0)), lumi_wire_Result_DONE);
+    lumi_plan_init(&plan, &b->rig);
+    plan.mode = LUMI_PLAN_START_STOP;
+    plan.positions = 24;
+    plan.position_time = 6;
+    plan.bracket = 3;
+    plan.exposures[0] = 0.02;
+    plan.exposures[1] = plan.exposures[2] = 0.2;
+    bench_load(b, &plan);
+    bench_set_input(b, BOARD_IN_REACHED, true);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(fire_here, .timeout = 5)), lumi_wire_Result_DONE);
+    for (int i = 0; i < 5000 && b->fired == 0; i++)
+        bench_beat(b);
+    assert_int_equal(b->fired, 1);
+    bench_set_input(b, BOARD_IN_REACHED, false); /* it leaves */
+    bench_until(b, lumi_wire_State_IDLE, 5);
+    assert_true(b->fired < 3);
+    bench_set_input(b, BOARD_IN_REACHED, true);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(fire_here, .timeout = 5)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 10);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(b->shot_fired[i], 1);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(fire_here, .timeout = 5)), lumi_wire_Result_BAD);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(mark_shots, .count = 3)), lumi_wire_Result_DONE);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(fire_here, .timeout = 5)), lumi_wire_Result_DONE);
+    bench_until(b, lumi_wire_State_IDLE, 10);
+    assert_int_equal(b->shot_fired[2], 2);
+    bench_destroy(b);
+}
+
 static void an_external_drive_on_a_string_wants_a_brake(void **state)
 {
     struct lumi_rig rig;
@@ -512,6 +548,7 @@ int main(void)
         cmocka_unit_test(a_stop_that_is_pressed_at_the_start_stands),
         cmocka_unit_test(a_driver_that_failed_leaves_the_position_unknown),
         cmocka_unit_test(an_external_drive_stands_while_flash_is_written),
+        cmocka_unit_test(an_external_drives_position_is_finished_and_nothing_taken_twice),
         cmocka_unit_test(an_external_drive_on_a_string_wants_a_brake),
         cmocka_unit_test(lines_fall_in_the_emergency_stops_interrupt),
         cmocka_unit_test(a_shot_that_is_finished_while_the_motor_halted_under_it_is_lost),
