@@ -13,6 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#define ANSWER_MS 1 /* the same where something has come that it may answer */
 #define IDLE_MS 5   /* between two looks at the clock */
 #define BEHIND 0.25 /* s: a computer that was busy for longer than that has stood still for the rig */
 #define ROOM 65536  /* bytes for a host that does not read; beyond it they are lost, as on a wire */
@@ -79,13 +80,16 @@ static int make_link(const char *link, const char *path, struct lumi_error *erro
     return LUMI_OK;
 }
 
-static void move_bytes(struct server *server)
+static bool move_bytes(struct server *server)
 {
     uint8_t bytes[1024];
     ssize_t got, gone;
+    bool any = false;
 
-    while ((got = read(server->master, bytes, sizeof bytes)) > 0)
+    while ((got = read(server->master, bytes, sizeof bytes)) > 0) {
         sim_machine_put(server->machine, bytes, (size_t)got);
+        any = true;
+    }
     server->waiting_size += sim_machine_get(server->machine, server->waiting + server->waiting_size,
                                             sizeof server->waiting - server->waiting_size);
     gone = server->waiting_size > 0 ? write(server->master, server->waiting, server->waiting_size) : 0;
@@ -95,9 +99,11 @@ static void move_bytes(struct server *server)
     }
     if (server->waiting_size == sizeof server->waiting)
         server->waiting_size = 0;
+    return any;
 }
 
-/* Virtual time follows the clock. */
+/* Virtual time follows the clock: bytes that have come are put in when it is there, not before, or the board would
+ * stamp them too early. */
 static void follow(struct server *server, const struct sim_serve_options *options)
 {
     double before = clock_now(), due = 0, began = sim_machine_seconds(server->machine);
@@ -107,13 +113,12 @@ static void follow(struct server *server, const struct sim_serve_options *option
         double now = clock_now();
         due += fmin(now - before, BEHIND) * options->speed;
         before = now;
-        move_bytes(server);
         sim_machine_run(server->machine, due);
         due = 0;
-        move_bytes(server);
+        bool answers = move_bytes(server);
         if (options->seconds > 0 && sim_machine_seconds(server->machine) - began >= options->seconds)
             return;
-        poll(&wait, 1, IDLE_MS);
+        poll(&wait, 1, answers ? ANSWER_MS : IDLE_MS);
     }
 }
 
