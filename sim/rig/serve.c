@@ -80,16 +80,10 @@ static int make_link(const char *link, const char *path, struct lumi_error *erro
     return LUMI_OK;
 }
 
-static bool move_bytes(struct server *server)
+static void send_bytes(struct server *server)
 {
-    uint8_t bytes[1024];
-    ssize_t got, gone;
-    bool any = false;
+    ssize_t gone;
 
-    while ((got = read(server->master, bytes, sizeof bytes)) > 0) {
-        sim_machine_put(server->machine, bytes, (size_t)got);
-        any = true;
-    }
     server->waiting_size += sim_machine_get(server->machine, server->waiting + server->waiting_size,
                                             sizeof server->waiting - server->waiting_size);
     gone = server->waiting_size > 0 ? write(server->master, server->waiting, server->waiting_size) : 0;
@@ -99,26 +93,27 @@ static bool move_bytes(struct server *server)
     }
     if (server->waiting_size == sizeof server->waiting)
         server->waiting_size = 0;
-    return any;
 }
 
-/* Virtual time follows the clock: bytes that have come are put in when it is there, not before, or the board would
- * stamp them too early. */
+/* Virtual time follows the clock, and never stands before what has come or behind what goes: bytes are read, time is
+ * brought up to now, and only then they are put in. The board would otherwise stamp them before they were sent. */
 static void follow(struct server *server, const struct sim_serve_options *options)
 {
-    double before = clock_now(), due = 0, began = sim_machine_seconds(server->machine);
+    double before = clock_now(), began = sim_machine_seconds(server->machine);
+    uint8_t bytes[1024];
 
     while (!(options->stop && *options->stop)) {
         struct pollfd wait = {.fd = server->master, .events = POLLIN};
+        ssize_t got = read(server->master, bytes, sizeof bytes);
         double now = clock_now();
-        due += fmin(now - before, BEHIND) * options->speed;
+        sim_machine_run(server->machine, fmin(now - before, BEHIND) * options->speed);
         before = now;
-        sim_machine_run(server->machine, due);
-        due = 0;
-        bool answers = move_bytes(server);
+        if (got > 0)
+            sim_machine_put(server->machine, bytes, (size_t)got);
+        send_bytes(server);
         if (options->seconds > 0 && sim_machine_seconds(server->machine) - began >= options->seconds)
             return;
-        poll(&wait, 1, answers ? ANSWER_MS : IDLE_MS);
+        poll(&wait, 1, got > 0 ? ANSWER_MS : IDLE_MS);
     }
 }
 
