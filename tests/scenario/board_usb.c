@@ -115,14 +115,39 @@ static void a_cleared_halt_begins_with_data0(struct board_fixture *f, uint16_t e
     assert_int_equal(board_client_wire(f->client)->retries, 0);
 }
 
+/* Three packets a round, so that not every one begins with DATA0 by chance. */
 static void so_does_a_configuration(struct board_fixture *f)
 {
+    write_part(f, 4);
     write_part(f, 4);
     assert_int_equal(usb_control(f->machine, 0x00, 9, 1, 0, NULL, 0, NULL), USB_DONE);
     usb_host_clear_toggle(f405_machine_usb(f->machine), LUMI_WIRE_USB_OUT);
     usb_host_clear_toggle(f405_machine_usb(f->machine), LUMI_WIRE_USB_IN);
     write_part(f, 4);
     assert_int_equal(board_client_wire(f->client)->retries, 0);
+}
+
+static void a_request_that_is_broken_off_leaves_nothing_behind(void **state)
+{
+    static const uint8_t setup[2][8] = {{0x80, 6, 0, 1, 0, 0, 18, 0}, {0x80, 6, 0, 2, 0, 0, 32, 0}};
+    struct board_fixture f;
+    uint8_t data[64];
+    size_t length = 0;
+    (void)state;
+    plugged(&f);
+    struct f405 *chip = f405_machine_chip(f.machine);
+    for (int i = 0; i < 6; i++) { /* one, or two at once; what they ask for is not fetched */
+        assert_int_equal(f405_usb_setup(chip, 5, 0, setup[i & 1]), F405_USB_ACK);
+        if (i >= 2)
+            assert_int_equal(f405_usb_setup(chip, 5, 0, setup[~i & 1]), F405_USB_ACK);
+        if (i < 4)
+            f405_machine_run(f.machine, 0.001);
+        assert_int_equal(usb_control(f.machine, 0x80, 8, 0, 0, data, sizeof data, &length), USB_DONE);
+        assert_int_equal(length, 1);
+        assert_int_equal(data[0], 1);
+    }
+    assert_int_equal(descriptor(&f, 2, 0, 0, data, sizeof data), 32);
+    board_fixture_finish(&f);
 }
 
 static void a_halted_endpoint_stalls_until_it_is_cleared(void **state)
@@ -260,6 +285,7 @@ int main(void)
         cmocka_unit_test(the_device_tells_what_it_is),
         cmocka_unit_test(windows_finds_its_driver_in_the_descriptors),
         cmocka_unit_test(what_the_device_does_not_know_is_stalled_and_nothing_hangs),
+        cmocka_unit_test(a_request_that_is_broken_off_leaves_nothing_behind),
         cmocka_unit_test(a_halted_endpoint_stalls_until_it_is_cleared),
         cmocka_unit_test(frames_of_every_length_pass_with_their_empty_packets),
         cmocka_unit_test(more_than_a_packet_holds_is_not_taken),
