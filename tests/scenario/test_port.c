@@ -175,6 +175,28 @@ static void an_emergency_stop_at_any_time_lets_no_pulse_rise_and_loses_none(void
     }
 }
 
+static void an_emergency_stop_passes_every_lock(void **state)
+{
+    static const uint32_t words[4] = {HOLD, 7000, 0, 0};
+    (void)state;
+    forget();
+    command(MOVE, 100000, 8400, 420, 0);
+    f405_uart_in(bench.chip, 2, (const uint8_t *)words, sizeof words);
+    for (int i = 0; i < 5000 && f405_output(bench.chip, F405_PIN('A', 8)) != F405_HIGH; i++)
+        run(1e-6);
+    f405_clear_stats(bench.chip);
+    f405_drive(bench.chip, F405_PIN('C', 0), F405_HIGH);
+    run(2e-5);
+    assert_int_equal(f405_output(bench.chip, F405_PIN('A', 8)), F405_HIGH); /* it is held still */
+    assert_int_equal(f405_stats(bench.chip, 16 + 6)->count, 1);
+    const int risen = bench.rise_count;
+    run(0.02);
+    assert_int_equal(bench.rise_count, risen);
+    assert_int_equal(command(SAY, 0, 0, 0, 0), risen);
+    f405_drive(bench.chip, F405_PIN('C', 0), F405_LOW);
+    run(0.001);
+}
+
 static void a_stop_at_any_time_loses_no_pulse_either(void **state)
 {
     (void)state;
@@ -360,6 +382,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pulses_are_as_many_as_asked_even_and_as_wide_as_said),
         cmocka_unit_test(an_emergency_stop_at_any_time_lets_no_pulse_rise_and_loses_none),
+        cmocka_unit_test(an_emergency_stop_passes_every_lock),
         cmocka_unit_test(a_stop_at_any_time_loses_no_pulse_either),
         cmocka_unit_test(times_of_feedbacks_and_steps_are_one_clock_to_the_tick),
         cmocka_unit_test(a_wire_that_has_come_off_reads_as_what_it_is_safest_to_believe),

@@ -62,14 +62,16 @@ static uint32_t levels(void)
     return all;
 }
 
-/* Holds the core's interrupts off for so many ticks. */
+/* Holds the core's interrupts off for so many ticks; the lamp is lit meanwhile. */
 static void hold(uint32_t ticks)
 {
     const uint32_t before = basepri_raise(PRIORITY_CORE);
     const uint64_t begun = time_now();
 
+    pin_output(BOARD_OUT_LAMP, true);
     while (time_now() - begun < ticks)
         ;
+    pin_output(BOARD_OUT_LAMP, false);
     basepri_restore(before);
 }
 
