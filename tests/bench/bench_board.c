@@ -145,7 +145,7 @@ static void sweep(const char *image, enum board_link link)
     for (int i = 0; i < 4; i++)
         rig.control.triggers[i].feedback = i;
     lumi_plan_init(&plan, &rig);
-    plan.positions = 36;
+    plan.positions = 24;
     plan.turn_time = 6;
     plan.exposures[0] = 0.001;
     struct board_client *client = begin(&rig, image, link, &machine);

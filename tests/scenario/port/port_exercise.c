@@ -90,7 +90,8 @@ static void execute(struct core *c, const uint32_t command[4])
         steps_stop();
     } else if (command[0] == TRIGGERS) {
         c->lines = 1;
-        c->trigger = time_now() + BOARD_TICK_HZ / 1000;
+        c->edges = 0;
+        c->trigger = time_now() + command[1];
         trigger_at(c->trigger, c->lines);
     } else if (command[0] == HOLD) {
         hold(command[1]);
