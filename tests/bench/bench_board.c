@@ -104,70 +104,9 @@ static void step_rates(struct f405_machine *machine, struct board_client *client
     }
 }
 
-/* A rig around the image: over `link`, with a profile, homed. */
-static struct board_client *begin(const struct lumi_rig *rig, const char *image, enum board_link link,
-                                  struct f405_machine **machine)
-{
-    struct sim_mechanics_options options;
-    struct lumi_error error = {0};
-    sim_mechanics_options_init(&options, rig);
-    options.start_turns = -0.003;
-    *machine = f405_machine_create(rig, &options);
-    if (!*machine || f405_machine_flash(*machine, image, &error) != LUMI_OK) {
-        fprintf(stderr, "bench_board: %s\n", *machine ? error.text : "no machine");
-        exit(1);
-    }
-    f405_machine_power(*machine, true);
-    struct board_client *client = board_client_create(*machine, link);
-    if (!client || board_client_configure(client, rig, &error) != LUMI_OK)
-        fail("configure", &error, *machine);
-    f405_clear_stats(f405_machine_chip(*machine));
-    if (board_client_home(client, false, 0, &error) != LUMI_OK)
-        fail("home", &error, *machine);
-    return client;
-}
-
-/* Every interrupt there is: 16 cameras, four of which tell when they expose, beside 10,000 steps a second; at its end a
- * press of the emergency stop, and all other switches. */
-static void sweep(const char *image, enum board_link link)
-{
-    static const enum board_input switches[] = {BOARD_IN_SLACK, BOARD_IN_STRING_END, BOARD_IN_WOUND,
-                                                BOARD_IN_DRIVER_FAULT, BOARD_IN_ESTOP};
-    struct lumi_error error = {0};
-    struct lumi_rig rig;
-    struct lumi_plan plan;
-    struct f405_machine *machine;
-    lumi_wire_SweepEnded ended;
-    if (lumi_rig_builtin("arc16", &rig, &error) != LUMI_OK)
-        return;
-    rig.microsteps = 32;
-    rig.control.motion.home_speed = 0.1;
-    for (int i = 0; i < 4; i++)
-        rig.control.triggers[i].feedback = i;
-    lumi_plan_init(&plan, &rig);
-    plan.positions = 24;
-    plan.turn_time = 6;
-    plan.exposures[0] = 0.001;
-    struct board_client *client = begin(&rig, image, link, &machine);
-    f405_clear_stats(f405_machine_chip(machine));
-    if (board_client_load_plan(client, &plan, &error) != LUMI_OK ||
-        board_client_start(client, &plan, 0, false, &error) != LUMI_OK ||
-        board_client_wait_sweep(client, 60, &ended, &error) != LUMI_OK)
-        fail("sweep", &error, machine);
-    for (size_t i = 0; i < sizeof switches / sizeof *switches; i++) {
-        sim_mechanics_force_input(f405_machine_mechanics(machine), switches[i], SIM_FORCE_ACTIVE);
-        board_client_run(client, 0.02, &error);
-    }
-    printf("\na sweep over %s: %.0f steps a second, %u shots of 16 cameras fired, %u lost\n",
-           link == BOARD_LINK_USB ? "USB" : "the serial line", lumi_rig_steps_per_turn(&rig) / plan.turn_time,
-           ended.fired, ended.lost);
-    print_interrupts(f405_machine_chip(machine));
-    board_client_destroy(client);
-    f405_machine_destroy(machine);
-}
-
 int main(int count, char **argument)
 {
+    struct sim_mechanics_options options;
     struct lumi_error error = {0};
     struct lumi_rig rig;
     if (count != 2) {
@@ -184,14 +123,24 @@ int main(int count, char **argument)
         fprintf(stderr, "bench_board: %s\n", error.text);
         return 1;
     }
-    struct f405_machine *machine;
-    struct board_client *client = begin(&rig, argument[1], BOARD_LINK_USB, &machine);
+    sim_mechanics_options_init(&options, &rig);
+    options.start_turns = -0.003;
+    struct f405_machine *machine = f405_machine_create(&rig, &options);
+    if (!machine || f405_machine_flash(machine, argument[1], &error) != LUMI_OK) {
+        fprintf(stderr, "bench_board: %s\n", machine ? error.text : "no machine");
+        return 1;
+    }
+    f405_machine_power(machine, true);
+    struct board_client *client = board_client_create(machine, BOARD_LINK_USB);
+    if (!client || board_client_configure(client, &rig, &error) != LUMI_OK)
+        fail("configure", &error, machine);
+    f405_clear_stats(f405_machine_chip(machine));
+    if (board_client_home(client, false, 0, &error) != LUMI_OK)
+        fail("home", &error, machine);
     printf("%.0f steps a turn; homing:\n", lumi_rig_steps_per_turn(&rig));
     print_interrupts(f405_machine_chip(machine));
     step_rates(machine, client, &rig);
     board_client_destroy(client);
     f405_machine_destroy(machine);
-    sweep(argument[1], BOARD_LINK_USB);
-    sweep(argument[1], BOARD_LINK_SERIAL);
     return 0;
 }
