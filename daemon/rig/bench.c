@@ -263,7 +263,8 @@ static int await_rest(const struct lumi_rig_bench *bench, struct heard *heard, d
         if (interrupts > stopped)
             stopped = stop_now(bench, interrupts);
         if (lumi_rig_link_now() >= ask) {
-            LUMI_TRY(lumi_rig_bench_status(bench->link, status, error));
+            if (lumi_rig_bench_status(bench->link, status, error))
+                return lumi_fail_prefix(error, "the board has taken the command; what became of it is not known");
             if (bench->progress)
                 bench->progress(bench->context, status);
             if (lumi_rig_state_at_rest(status->state))

@@ -209,7 +209,7 @@ int lumi_rig_link_request(struct lumi_rig_link *link, const lumi_wire_Request *r
                              "%s: no answer within %.3g s; whether the board has executed it is not known",
                              link->snapshot.name, seconds);
         else
-            code = lumi_fail(error, LUMI_ERR_IO, "%s (waited %.3g s; nothing was sent)",
+            code = lumi_fail(error, LUMI_ERR_IO, "%s (waited %.3g s; this request was not sent)",
                              link->snapshot.state == LUMI_RIG_LINK_OPEN ? "the link is busy with other requests"
                                                                         : link->snapshot.text,
                              seconds);
