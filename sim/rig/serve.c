@@ -66,6 +66,15 @@ static int open_terminal(struct server *server, char path[256], struct lumi_erro
     return LUMI_OK;
 }
 
+static bool leads_to(const char *link, const char *path)
+{
+    char target[256];
+    ssize_t size = readlink(link, target, sizeof target);
+
+    return size >= 0 && (size_t)size == strlen(path) && memcmp(target, path, (size_t)size) == 0;
+}
+
+/* One that was left behind (it leads nowhere, or to the number that this terminal has now) is taken over. */
 static int make_link(const char *link, const char *path, struct lumi_error *error)
 {
     struct stat there;
@@ -73,6 +82,8 @@ static int make_link(const char *link, const char *path, struct lumi_error *erro
     if (lstat(link, &there) == 0) {
         if (!S_ISLNK(there.st_mode))
             return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there, and no symbolic link", link);
+        if (!leads_to(link, path) && stat(link, &there) == 0)
+            return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there, and what it leads to is another's", link);
         unlink(link);
     }
     if (symlink(path, link) != 0)
@@ -147,7 +158,7 @@ int sim_serve(const struct lumi_rig *rig, const struct sim_serve_options *option
     follow(server, options);
     code = LUMI_OK;
 done:
-    if (linked)
+    if (linked && leads_to(options->link, path))
         unlink(options->link);
     if (server->slave >= 0)
         close(server->slave);

@@ -23,8 +23,8 @@ struct sim_serve_options {
 };
 void sim_serve_options_init(struct sim_serve_options *options, const struct lumi_rig *rig);
 
-/* Until `stop` or the time is over. An existing `link` is replaced if it is a symbolic link, else refused
- * (LUMI_ERR_EXISTS). It is removed at the end. */
+/* Until `stop` or the time is over. An existing `link` is replaced if it is a symbolic link that was left
+ * behind, else refused (LUMI_ERR_EXISTS). It is removed at the end if it still leads here. */
 int sim_serve(const struct lumi_rig *rig, const struct sim_serve_options *options, struct lumi_error *error);
 
 #endif

@@ -28,13 +28,15 @@ refuses 3 'arc17' "$lumi" sim board --profile arc17
 : >"$dir/file"
 refuses 3 'no symbolic link' "$lumi" sim board --pty "$dir/file"
 
+ln -s "$dir/nowhere" "$dir/rig" # left behind by one that was killed
 "$lumi" sim board --profile arc16 --pty "$dir/rig" --speed 8 --seconds 4000 >"$dir/path" 2>"$dir/log" &
 board=$!
 for i in 1 2 3 4 5 6 7 8 9 10; do
-    [ -L "$dir/rig" ] && break
+    [ -e "$dir/rig" ] && break
     sleep 1
 done
-[ -L "$dir/rig" ] || fail "no pseudo-terminal: $(cat "$dir/log")"
+[ -e "$dir/rig" ] || fail "no pseudo-terminal: $(cat "$dir/log")"
+refuses 3 "another's" "$lumi" sim board --pty "$dir/rig"
 link="serial:$dir/rig"
 "$lumi" rig status --link "$link" >"$dir/status"
 grep -q '^state *lost' "$dir/status" || fail "not lost at its start: $(cat "$dir/status")"
@@ -45,5 +47,18 @@ grep -q '^state *idle' "$dir/status" || fail "not homed: $(cat "$dir/status")"
 kill "$board"
 wait "$board" || fail "status $? when told to end"
 board=
-[ ! -e "$dir/rig" ] || fail "the link is left behind"
+[ ! -L "$dir/rig" ] || fail "the link is left behind"
+
+# One that has become another's is not its to remove.
+"$lumi" sim board --pty "$dir/rig" --speed 100 >"$dir/second" 2>"$dir/log" &
+board=$!
+for i in 1 2 3 4 5 6 7 8 9 10; do
+    [ -s "$dir/second" ] && break
+    sleep 1
+done
+ln -sf "$dir/file" "$dir/rig"
+kill "$board"
+wait "$board" || fail "status $? when told to end"
+board=
+[ -L "$dir/rig" ] || fail "another's link is gone"
 echo good
