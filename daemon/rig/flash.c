@@ -62,6 +62,33 @@ int lumi_rig_image_check(const uint8_t *data, size_t size, const char *source, c
     return LUMI_OK;
 }
 
+static bool read_version(const char *text, uint32_t numbers[3])
+{
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        if (!g_ascii_isdigit(*text))
+            return false;
+        uint64_t number = g_ascii_strtoull(text, &end, 10);
+        if (number > UINT32_MAX || *end != (i < 2 ? '.' : '\0'))
+            return false;
+        numbers[i] = (uint32_t)number;
+        text = end + 1;
+    }
+    return true;
+}
+
+bool lumi_rig_version_older(const char *version, const char *other)
+{
+    uint32_t a[3], b[3];
+
+    if (!read_version(version, a) || !read_version(other, b))
+        return false;
+    for (int i = 0; i < 3; i++)
+        if (a[i] != b[i])
+            return a[i] < b[i];
+    return false;
+}
+
 /* ---- dfu-util ---- */
 
 /* The end of what it said, on one line. */
@@ -110,18 +137,23 @@ static int spawn(const char *program, char *const *arguments, int *output, pid_t
     return lumi_fail_errno(error, program, "start");
 }
 
-/* Reads until it ends; false: it did not in time. */
-static bool read_until_end(int output, double seconds, struct tail *tail)
+static bool cancelled(const struct lumi_rig_flash *flash)
 {
-    uint64_t deadline = lumi_rig_link_now() + (uint64_t)(seconds * 1e9);
+    return flash->cancelled && flash->cancelled(flash->context);
+}
+
+/* Reads until it ends; false: it did not in time, or nobody wants it any more. */
+static bool read_until_end(int output, const struct lumi_rig_flash *flash, struct tail *tail)
+{
+    uint64_t deadline = lumi_rig_link_now() + (uint64_t)(flash->loader_seconds * 1e9);
     struct pollfd one = {.fd = output, .events = POLLIN};
     char data[512];
 
     for (;;) {
         uint64_t now = lumi_rig_link_now();
-        if (now >= deadline)
+        if (now >= deadline || cancelled(flash))
             return false;
-        if (poll(&one, 1, (int)MIN((deadline - now) / 1000000 + 1, 1000)) <= 0)
+        if (poll(&one, 1, (int)MIN((deadline - now) / 1000000 + 1, 200)) <= 0)
             continue;
         ssize_t count = read(output, data, sizeof data);
         if (count <= 0 && !(count < 0 && errno == EINTR))
@@ -151,12 +183,15 @@ static int run_dfu_util(const struct lumi_rig_flash *flash, struct lumi_error *e
     int output = -1, status = 0;
 
     LUMI_TRY(spawn(flash->program, arguments, &output, &child, error));
-    ended = read_until_end(output, flash->loader_seconds, &tail);
+    ended = read_until_end(output, flash, &tail);
     close(output);
     if (!ended)
         kill(child, SIGKILL);
     while (waitpid(child, &status, 0) < 0 && errno == EINTR)
         ;
+    if ((!ended || !WIFEXITED(status) || WEXITSTATUS(status) != 0) && cancelled(flash)) /* Ctrl-C reaches both */
+        return lumi_fail(error, LUMI_ERR_CANCELLED,
+                         "interrupted; the board waits in its loader: lumi rig flash --in-loader %s", flash->path);
     if (!ended)
         return lumi_fail(error, LUMI_ERR_IO,
                          "%s did not end within %.3g s; is the board's USB plugged in? It waits in its loader: run "
@@ -199,6 +234,8 @@ static int enter_loader(const struct lumi_rig_flash *flash, struct lumi_error *e
     LUMI_TRY(lumi_rig_bench_status(flash->link, &status, error));
     if (!lumi_rig_state_at_rest(status.state))
         return lumi_fail(error, LUMI_ERR_BUSY, "not while the board is %s", lumi_wire_state_name(status.state));
+    if (cancelled(flash))
+        return lumi_fail(error, LUMI_ERR_CANCELLED, "interrupted; the board is as it was");
     code = lumi_rig_link_command(flash->link, &request, GONE_SECONDS, NULL, error);
     return code == LUMI_ERR_IO ? LUMI_OK : code;
 }
@@ -216,6 +253,8 @@ static int await_board(const struct lumi_rig_flash *flash, uint32_t boot, struct
             break;
         if (snapshot.state == LUMI_RIG_LINK_VERSION)
             return lumi_fail(error, LUMI_ERR_VERSION, "flashed; %s", snapshot.text);
+        if (cancelled(flash))
+            return lumi_fail(error, LUMI_ERR_CANCELLED, "flashed; interrupted before the board was back");
         if (lumi_rig_link_now() >= deadline)
             return lumi_fail(error, LUMI_ERR_IO, "flashed, but the board has not come back within %.3g s: %s",
                              flash->restart_seconds, snapshot.text[0] ? snapshot.text : "it has not restarted");
@@ -240,6 +279,9 @@ int lumi_rig_flash(struct lumi_rig_flash *flash, struct lumi_error *error)
                                 error);
     lumi_free(data);
     LUMI_TRY(code);
+    if (flash->link && !flash->older && lumi_rig_version_older(flash->image.firmware, snapshot.welcome.firmware))
+        return lumi_fail(error, LUMI_ERR_VERSION, "%s: firmware %s is older than the board's %s (--older writes it)",
+                         flash->path, flash->image.firmware, snapshot.welcome.firmware);
     LUMI_TRY(find_program(flash, error));
     if (flash->link) {
         say(flash, "entering the loader");

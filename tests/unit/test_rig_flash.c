@@ -91,7 +91,9 @@ static void images_that_are_cut_damaged_or_anothers_are_refused(void **state)
 
 /* ---- flashing ---- */
 
-static bool entered, restarted;
+static bool entered, restarted, allow_older;
+static const char *runs = "1.2.2";
+static bool (*interrupted)(void *context);
 
 static void execute(struct fake_board *self, const lumi_wire_Request *request, lumi_wire_Reply *reply)
 {
@@ -135,6 +137,8 @@ static int flash(const char *program_lines, struct lumi_error *error)
 
     memset(&board, 0, sizeof board);
     entered = restarted = false;
+    snprintf(board.identity.board, sizeof board.identity.board, "host");
+    snprintf(board.identity.firmware, sizeof board.identity.firmware, "%s", runs);
     unlink(done_path);
     board.execute = execute;
     board.idle = idle;
@@ -148,6 +152,8 @@ static int flash(const char *program_lines, struct lumi_error *error)
     flash.path = image_path;
     flash.program = program_path;
     flash.loader_seconds = 20;
+    flash.older = allow_older;
+    flash.cancelled = interrupted;
     flash.restart_seconds = 20;
     assert_int_equal(lumi_rig_link_open(board.address, NULL, &flash.link, error), LUMI_OK);
     assert_int_equal(lumi_rig_link_wait(flash.link, 20, false, error), LUMI_OK);
@@ -182,6 +188,54 @@ static void a_board_that_comes_back_with_another_version_is_told(void **state)
     comes_back_as = "1.2.2";
     assert_int_equal(flash("echo >%s", &error), LUMI_ERR_IO);
     assert_non_null(strstr(error.text, "flashed 1.2.3, but the board runs 1.2.2"));
+}
+
+static void versions_are_compared_where_that_is_clear(void **state)
+{
+    (void)state;
+    assert_true(lumi_rig_version_older("1.2.3", "1.10.0"));
+    assert_true(lumi_rig_version_older("0.9.9", "1.0.0"));
+    assert_false(lumi_rig_version_older("1.2.3", "1.2.3"));
+    assert_false(lumi_rig_version_older("2.0.0", "1.9.9"));
+    assert_false(lumi_rig_version_older("1.2", "1.9.9"));
+    assert_false(lumi_rig_version_older("1.2.3-rc1", "1.9.9"));
+    assert_false(lumi_rig_version_older("1.2.3", "unknown"));
+    assert_false(lumi_rig_version_older("1.2.99999999999", "2.0.0"));
+}
+
+static void an_older_version_is_written_only_if_that_is_said(void **state)
+{
+    struct lumi_error error = {0};
+
+    (void)state;
+    runs = "1.3.0";
+    comes_back_as = "1.2.3";
+    assert_int_equal(flash("echo >%s", &error), LUMI_ERR_VERSION);
+    assert_non_null(strstr(error.text, "1.2.3 is older than the board's 1.3.0"));
+    assert_false(entered);
+    allow_older = true;
+    assert_int_equal(flash("echo >%s", &error), LUMI_OK);
+    allow_older = false;
+    runs = "1.2.2";
+}
+
+static bool while_it_writes(void *context)
+{
+    (void)context;
+    return access(done_path, F_OK) == 0;
+}
+
+static void who_interrupts_the_writing_is_told_how_to_go_on(void **state)
+{
+    struct lumi_error error = {0};
+
+    (void)state;
+    comes_back_as = "1.2.3";
+    interrupted = while_it_writes;
+    assert_int_equal(flash("echo >%s; exec sleep 1000", &error), LUMI_ERR_CANCELLED);
+    assert_non_null(strstr(error.text, "waits in its loader: lumi rig flash --in-loader"));
+    assert_true(entered);
+    interrupted = NULL;
 }
 
 static void what_the_writing_program_says_is_passed_on(void **state)
@@ -221,6 +275,7 @@ static void nothing_is_flashed_while_the_rig_moves_or_without_the_program(void *
     memset(&board, 0, sizeof board);
     entered = false;
     board.execute = execute;
+    snprintf(board.identity.board, sizeof board.identity.board, "host");
     board.status.state = lumi_wire_State_SWEEPING;
     fake_board_start(&board, "pty");
     lumi_rig_flash_init(&moving);
@@ -268,6 +323,9 @@ int main(void)
         cmocka_unit_test(images_that_are_cut_damaged_or_anothers_are_refused),
         cmocka_unit_test(a_board_is_flashed_and_says_the_new_version),
         cmocka_unit_test(a_board_that_comes_back_with_another_version_is_told),
+        cmocka_unit_test(versions_are_compared_where_that_is_clear),
+        cmocka_unit_test(an_older_version_is_written_only_if_that_is_said),
+        cmocka_unit_test(who_interrupts_the_writing_is_told_how_to_go_on),
         cmocka_unit_test(what_the_writing_program_says_is_passed_on),
         cmocka_unit_test(a_writing_program_that_hangs_is_ended),
         cmocka_unit_test(nothing_is_flashed_while_the_rig_moves_or_without_the_program),
