@@ -16,7 +16,9 @@ static const GOptionEntry options[] = {
     CLI_RIG_LINK_OPTION(address),
     {"log", 0, 0, G_OPTION_ARG_FILENAME, &log_path, "writes a JSON line a shot", "FILE"},
     {"resume", 0, 0, G_OPTION_ARG_NONE, &resume, "takes what is missing; joins a sweep that is going on", NULL},
-    {"again", 0, 0, G_OPTION_ARG_NONE, &again, "takes everything anew, though the board holds an unfinished sweep",
+    {"again", 0, 0, G_OPTION_ARG_NONE, &again,
+     "everything anew, though the board holds an unfinished sweep; with --resume what is missing, though it holds "
+     "another plan's",
      NULL},
     {"patience", 0, 0, G_OPTION_ARG_DOUBLE, &patience, "without a word from the board (60)", "SECONDS"},
     {"drive", 0, 0, G_OPTION_ARG_STRING, &drive_address, "rtu:/dev/ttyUSB1[,baud=N][,parity=E] or tcp:HOST[:PORT]",
@@ -86,6 +88,8 @@ static int sweep_it(struct lumi_rig_sweep_run *sweep, struct lumi_error *error)
 
     LUMI_TRY(lumi_rig_sweep_log_open(&log, log_path, resume, sweep->plan, sweep->rig, error));
     sweep->log = &log;
+    if (log.anew)
+        fprintf(stderr, "%s: held no whole line; it is begun anew, and the board is asked for its shots\n", log_path);
     code = lumi_rig_sweep_run(sweep, error);
     cli_progress_end();
     if (lumi_rig_sweep_log_close(&log, &close_error) && code == LUMI_OK) {
@@ -101,8 +105,6 @@ static int sweep_it(struct lumi_rig_sweep_run *sweep, struct lumi_error *error)
 
 static int check_options(struct lumi_error *error)
 {
-    if (resume && again)
-        return lumi_fail(error, LUMI_ERR_ARG, "either --resume or --again");
     if (!drive_address != !map_path)
         return lumi_fail(error, LUMI_ERR_ARG, "--drive and --map go together");
     if (!(patience > 0 && patience <= 86400))

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #define LOG_MAX (256u << 20)
+#define FIRST_LINE 256
 
 /* ---- reading ---- */
 
@@ -68,16 +69,41 @@ static void take_line(struct lumi_rig_sweep_log *log, const struct lumi_rig_log_
         log->fired[line->shot / 8] |= (uint8_t)(1u << line->shot % 8);
 }
 
-static int read_old(struct lumi_rig_sweep_log *log, const struct lumi_plan *plan, struct lumi_error *error)
+/* With its end, and a zero. */
+static size_t first_line(const struct lumi_plan *plan, const struct lumi_rig *rig, char line[FIRST_LINE])
+{
+    return (size_t)snprintf(
+        line, FIRST_LINE,
+        "{\"log\":\"lumi rig run\",\"version\":1,\"plan\":\"%s\",\"plan_crc\":%u,\"rig\":\"%s\",\"shots\":%d}\n",
+        plan->name, (unsigned)lumi_wire_plan_crc(plan), rig->name, lumi_plan_shots(plan));
+}
+
+/* A first line that was torn: nothing of it, its beginning, or zeros where a file system had only made room. */
+static bool torn_first_line(const uint8_t *text, size_t size, const struct lumi_plan *plan, const struct lumi_rig *rig)
+{
+    char line[FIRST_LINE];
+    size_t length = first_line(plan, rig, line), same = 0;
+
+    while (same < size && same < length && text[same] == (uint8_t)line[same])
+        same++;
+    while (same < size && text[same] == 0)
+        same++;
+    return same == size;
+}
+
+static int read_old(struct lumi_rig_sweep_log *log, const struct lumi_plan *plan, const struct lumi_rig *rig,
+                    struct lumi_error *error)
 {
     uint8_t *text;
-    size_t size, at = 0;
+    size_t size, whole, at = 0;
     struct lumi_rig_log_line line;
     int code;
 
     LUMI_TRY(lumi_file_read(log->path, LOG_MAX, &text, &size, error));
+    whole = size;
     while (size && text[size - 1] != '\n')
         size--; /* torn */
+    log->anew = !size && torn_first_line(text, whole, plan, rig);
     for (int count = 0; at < size; count++) {
         size_t length = (size_t)((const uint8_t *)memchr(text + at, '\n', size - at) - (text + at));
         lumi_rig_log_line_parse((const char *)text + at, length, &line);
@@ -89,7 +115,7 @@ static int read_old(struct lumi_rig_sweep_log *log, const struct lumi_plan *plan
         take_line(log, &line);
         at += length + 1;
     }
-    code = size ? LUMI_OK : lumi_fail(error, LUMI_ERR_FORMAT, "%s: an empty log", log->path);
+    code = size || log->anew ? LUMI_OK : lumi_fail(error, LUMI_ERR_FORMAT, "%s: no log of this sweep", log->path);
     if (code == LUMI_OK && truncate(log->path, (off_t)size))
         code = lumi_fail_errno(error, log->path, "truncate");
 done:
@@ -118,13 +144,9 @@ static int append(struct lumi_rig_sweep_log *log, char *line, size_t size, struc
 static int begin(struct lumi_rig_sweep_log *log, const struct lumi_plan *plan, const struct lumi_rig *rig,
                  struct lumi_error *error)
 {
-    char line[256];
-    int size =
-        snprintf(line, sizeof line - 1,
-                 "{\"log\":\"lumi rig run\",\"version\":1,\"plan\":\"%s\",\"plan_crc\":%u,\"rig\":\"%s\",\"shots\":%d}",
-                 plan->name, (unsigned)lumi_wire_plan_crc(plan), rig->name, lumi_plan_shots(plan));
+    char line[FIRST_LINE];
 
-    return append(log, line, (size_t)size, error);
+    return append(log, line, first_line(plan, rig, line) - 1, error);
 }
 
 int lumi_rig_sweep_log_open(struct lumi_rig_sweep_log *log, const char *path, bool resume, const struct lumi_plan *plan,
@@ -141,16 +163,16 @@ int lumi_rig_sweep_log_open(struct lumi_rig_sweep_log *log, const char *path, bo
         return lumi_fail(error, LUMI_ERR_ARG, "%s: the name is too long", path);
     g_strlcpy(log->path, path, sizeof log->path);
     if (old)
-        LUMI_TRY(read_old(log, plan, error));
+        LUMI_TRY(read_old(log, plan, rig, error));
     log->fd = open(path, O_WRONLY | O_APPEND | O_CLOEXEC | (old ? 0 : O_CREAT | O_EXCL), 0666);
     if (log->fd < 0 && errno == EEXIST)
         return lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already (--resume goes on with it)", path);
     if (log->fd < 0)
         return lumi_fail_errno(error, path, "open");
-    if (old)
+    if (old && !log->anew)
         return LUMI_OK;
     code = begin(log, plan, rig, error);
-    log->fresh = true;
+    log->fresh = !old;
     if (code != LUMI_OK)
         lumi_rig_sweep_log_close(log, NULL);
     return code;

@@ -10,6 +10,7 @@
 struct lumi_rig_sweep_log {
     int fd;     /* −1: nothing is kept */
     bool fresh; /* made now, and nothing in it but its first line */
+    bool anew;  /* it was there, without a whole first line: begun anew */
     char path[1024];
     /* What it held when it was opened. */
     uint32_t boot, event; /* of the last event in it */
@@ -18,7 +19,8 @@ struct lumi_rig_sweep_log {
 };
 
 /* `path` NULL: nothing is kept. A new one is made (LUMI_ERR_EXISTS where there is one), or with `resume` an old one
- * goes on: LUMI_ERR_FORMAT where it is of another plan, or no such log. */
+ * goes on: LUMI_ERR_FORMAT where it is of another plan, or no such log. An empty one, or one that holds no more than
+ * the beginning of the first line (a power cut), is begun anew. */
 int lumi_rig_sweep_log_open(struct lumi_rig_sweep_log *log, const char *path, bool resume, const struct lumi_plan *plan,
                             const struct lumi_rig *rig, struct lumi_error *error);
 /* A log in which nothing came to stand goes again: its sweep never began. */

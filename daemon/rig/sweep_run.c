@@ -21,6 +21,8 @@ struct course {
     uint32_t next_event;  /* seen up to here */
     uint32_t boot, turn;
     bool begun; /* StartSweep was answered */
+    bool kept;  /* the board held this plan, and its account of the shots, before it was given it */
+    bool left;  /* the log holds every shot: the board was left alone */
     bool restarted;
     int obeyed; /* interrupts that were acted on */
     uint64_t begun_ns, heard_ns, rest_ns;
@@ -173,12 +175,13 @@ static int mark(struct course *course, uint32_t first, uint32_t count, bool fire
     return lumi_rig_link_command(course->run->link, &request, ANSWER_SECONDS, NULL, error);
 }
 
-/* The board has started again since the log's last event, and knows nothing of what was fired before. */
+/* The board has started again since the log's last event, or had another plan meanwhile, and knows nothing of what was
+ * fired before. */
 static int remind(struct course *course, struct lumi_error *error)
 {
     struct lumi_rig_sweep_run *run = course->run;
 
-    if (!run->log || !run->log->any || run->log->boot == course->boot)
+    if (!run->log || !run->log->any || (course->kept && run->log->boot == course->boot))
         return LUMI_OK;
     for (uint32_t first = 0, count; first < run->shots; first += count + 1) {
         for (count = 0; first + count < run->shots && course->states[first + count] != 1 &&
@@ -214,6 +217,37 @@ static int start(struct course *course, uint32_t first, struct lumi_error *error
     return lumi_rig_link_command(course->run->link, &request, ANSWER_SECONDS, NULL, error);
 }
 
+/* On a board that holds another plan: whether its sweep is unfinished, and its account would be lost. */
+static int spare_another(struct course *course, const lumi_wire_Status *status, struct lumi_error *error)
+{
+    const lumi_wire_Request request = {.which_command = lumi_wire_Request_read_plan_tag};
+    struct lumi_plan plan;
+    lumi_wire_Reply reply;
+    uint32_t shots;
+
+    LUMI_TRY(lumi_rig_link_command(course->run->link, &request, ANSWER_SECONDS, &reply, error));
+    if (reply.which_payload != lumi_wire_Reply_plan_tag)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "the board's answer holds no plan");
+    LUMI_TRY(lumi_wire_to_plan(&reply.payload.plan, &plan, error));
+    shots = (uint32_t)lumi_plan_shots(&plan);
+    if (status->shots_fired >= shots)
+        return LUMI_OK;
+    return lumi_fail(
+        error, LUMI_ERR_EXISTS,
+        "the board holds another sweep, %s, with %u of %u shots fired, and would forget which: finish that "
+        "one first, or say --again too",
+        plan.name, (unsigned)status->shots_fired, (unsigned)shots);
+}
+
+static bool whole_log(const struct lumi_rig_sweep_run *run)
+{
+    uint32_t shot = 0;
+
+    while (run->log && shot < run->shots && lumi_rig_sweep_log_has(run->log, shot))
+        shot++;
+    return run->shots && shot == run->shots;
+}
+
 /* Whether this sweep may begin, and whether the board is at it already. */
 static int may_begin(struct course *course, const lumi_wire_Status *status, bool *running, struct lumi_error *error)
 {
@@ -230,6 +264,9 @@ static int may_begin(struct course *course, const lumi_wire_Status *status, bool
             "the board holds this sweep with %u of %u shots fired: --resume takes what is missing, --again "
             "everything anew",
             (unsigned)status->shots_fired, (unsigned)run->shots);
+    course->kept = ours;
+    if (!ours && run->resume && !run->again && status->plan_crc && status->shots_fired)
+        return spare_another(course, status, error);
     return LUMI_OK;
 }
 
@@ -246,6 +283,12 @@ static int begin(struct course *course, struct lumi_error *error)
     course->boot = snapshot.welcome.boot;
     course->first_event = status.events_next;
     course->next_event = snapshot.welcome.events_first;
+    course->left = run->resume && status.plan_crc != lumi_wire_plan_crc(run->plan) && whole_log(run);
+    if (course->left) {
+        run->fired = run->shots;
+        run->ended = true;
+        return LUMI_OK;
+    }
     LUMI_TRY(may_begin(course, &status, &running, error));
     lumi_rig_link_take_charge(run->link, true); /* not before it is clear that its events are ours to take */
     if (running) {                              /* its end may be among what the board has kept */
@@ -461,6 +504,8 @@ int lumi_rig_sweep_run(struct lumi_rig_sweep_run *run, struct lumi_error *error)
                          run->drive ? "the board steps the motor itself" : "an external drive turns it: which one?");
     LUMI_TRY(lumi_plan_check(run->plan, run->rig, error));
     LUMI_TRY(begin(&course, error));
+    if (course.left)
+        return LUMI_OK;
     if (!run->ended)
         LUMI_TRY(run->drive ? drive_it(&course, error) : follow(&course, error));
     return account(&course, error);

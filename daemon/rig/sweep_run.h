@@ -20,7 +20,8 @@ struct lumi_rig_sweep_run {
     const struct lumi_rig *rig; /* the board's profile */
     const struct lumi_plan *plan;
     bool resume;     /* goes on with what is missing; joins a sweep that is going on */
-    bool again;      /* takes every shot again, though the board holds an unfinished sweep of this plan */
+    bool again;      /* takes every shot again, though the board holds an unfinished sweep of this plan; with resume
+                        only what is missing, though the board holds one of another plan */
     double patience; /* s without a word from the board before it is given up (60) */
     struct lumi_rig_sweep_log *log;
     struct lumi_rig_drive *drive; /* of a rig that has one; otherwise NULL */
@@ -39,7 +40,8 @@ struct lumi_rig_sweep_run {
 void lumi_rig_sweep_run_init(struct lumi_rig_sweep_run *run);
 /* LUMI_OK: complete, every shot fired. Otherwise the text says what ended it and what is missing: LUMI_ERR_CANCELLED
  * (the operator), LUMI_ERR_BUSY (the board refuses), LUMI_ERR_IO (a fault, lost shots, no word from the board),
- * LUMI_ERR_EXISTS (an unfinished sweep of this plan is on the board, and neither resume nor again was said). */
+ * LUMI_ERR_EXISTS (an unfinished sweep of this plan is on the board, and neither resume nor again was said; or one of
+ * another plan, and resume without again). */
 int lumi_rig_sweep_run(struct lumi_rig_sweep_run *run, struct lumi_error *error);
 
 /* "3, 17-24, 30" of the shots that are not fired, cut with "…" where it gets long; states: two bits a shot would be 0

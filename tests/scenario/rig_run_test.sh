@@ -142,6 +142,26 @@ rig run second --resume --log log2 --json >printed 2>&1 || fail "not completed a
 grep -q '"fired":72,"lost":0,"missing":0,"complete":true' printed || fail "$(cat printed)"
 each_once log2 72
 
+# The board holds another unfinished sweep: what is complete leaves it alone, what is not is refused.
+printf '[sweep]\nname = third\nturn_time_s = 100\n' >third
+"$lumi" rig run -l "$board" third --log log3 >printed 2>&1 &
+runner=$!
+await_shots log3 8
+kill -INT $runner
+wait $runner
+expect 0 "72 shots fired" rig run plan --resume --log log
+head -n 30 log2 >part
+expect_line 3 "another sweep, third" rig run second --resume --log part
+rig status | grep -q "sweep     0 fired" && fail "the board has forgotten the other sweep"
+rig run second --resume --again --log part >printed 2>&1 || fail "not completed after another sweep: $(cat printed)"
+each_once part 72
+printf '{"log":"lumi rig run","ver' >torn
+rig run second --resume --log torn >printed 2>&1 || fail "not gone on with after a torn log: $(cat printed)"
+grep -q "begun anew" printed || fail "nothing is said of a torn log: $(cat printed)"
+each_once torn 72
+rig run third --resume --log log3 >printed 2>&1 || fail "the other sweep was not completed: $(cat printed)"
+each_once log3 72
+
 # Stopped by hand; an emergency stop by the link.
 "$lumi" rig run -l "$board" plan --again >printed 2>&1 &
 runner=$!

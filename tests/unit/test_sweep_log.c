@@ -161,8 +161,39 @@ static void other_files_are_not_gone_on_with(void **state)
     assert_non_null(strstr(error.text, "another plan"));
     assert_int_equal(lumi_file_write(path, "hello\n", 6, false, NULL), LUMI_OK);
     assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_ERR_FORMAT);
-    assert_int_equal(lumi_file_write(path, "", 0, false, NULL), LUMI_OK);
+    assert_int_equal(lumi_file_write(path, "{\"log\":\"mine\"", 13, false, NULL), LUMI_OK);
     assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_ERR_FORMAT);
+}
+
+static void a_log_whose_first_line_was_torn_is_begun_anew(void **state)
+{
+    struct lumi_rig_sweep_log log;
+    struct lumi_error error = {0};
+    uint8_t *text;
+    size_t size;
+
+    (void)state;
+    for (size_t left = 0; left < 120; left += 7) {
+        write_log(0);
+        assert_int_equal(lumi_rig_sweep_log_open(&log, path, false, &plan, &rig, &error), LUMI_OK);
+        struct lumi_rig_notice first = shot(10, 0, false);
+        assert_int_equal(lumi_rig_sweep_log_notice(&log, &first, &clock_of_boot, &error), LUMI_OK);
+        assert_int_equal(lumi_rig_sweep_log_close(&log, &error), LUMI_OK);
+        assert_int_equal(lumi_file_read(path, 1 << 20, &text, &size, &error), LUMI_OK);
+        size_t line = (size_t)((uint8_t *)memchr(text, '\n', size) - text);
+        lumi_free(text);
+        assert_false(truncate(path, (off_t)(left < line ? left : line)));
+        if (left % 2)
+            assert_false(truncate(path, 200)); /* zeros */
+        assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_OK);
+        assert_true(log.anew);
+        assert_false(lumi_rig_sweep_log_has(&log, 0));
+        assert_int_equal(lumi_rig_sweep_log_close(&log, &error), LUMI_OK);
+        assert_int_equal(count_lines(), 1);
+        assert_int_equal(lumi_rig_sweep_log_open(&log, path, true, &plan, &rig, &error), LUMI_OK);
+        assert_false(log.anew);
+        assert_int_equal(lumi_rig_sweep_log_close(&log, &error), LUMI_OK);
+    }
 }
 
 static void a_log_in_which_nothing_came_to_stand_goes_again(void **state)
@@ -255,6 +286,7 @@ int main(void)
         cmocka_unit_test(what_is_written_is_known_when_it_is_opened_again),
         cmocka_unit_test(a_torn_line_is_dropped),
         cmocka_unit_test(other_files_are_not_gone_on_with),
+        cmocka_unit_test(a_log_whose_first_line_was_torn_is_begun_anew),
         cmocka_unit_test(a_log_in_which_nothing_came_to_stand_goes_again),
         cmocka_unit_test(how_the_clocks_stood_is_written_when_it_is_known),
         cmocka_unit_test(missing_shots_are_named_as_ranges),
