@@ -86,6 +86,8 @@ void core_rest(struct core *core)
         core_state_event(core, known ? EVENT_FAULT_KNOWN : EVENT_FAULT_LOST);
     else
         core_state_event(core, known ? EVENT_REST_KNOWN : EVENT_REST_LOST);
+    if (core->safety.standing == 0 && !core->safety.estop_seen)
+        sweep_unrecord(core); /* the pulse that was owed may have been dropped by a stop */
 }
 
 void core_stop_soon(struct core *core, bool finish)

@@ -183,7 +183,7 @@ const char *safety_clear(struct core *core, uint32_t faults)
     if (s->estop_seen)
         motion_halt(&core->motion);
     if (core->has_profile && !s->estop_seen)
-        sweep_cleared(core);
+        sweep_unrecord(core);
     for (int i = 0; i < LUMI_RIG_FAULTS; i++)
         if (faults & BIT(i))
             core_report_fault(core, i, false, "");

@@ -152,7 +152,8 @@ static void poll_wind(struct core *core)
         sweep_done(core);
         return;
     }
-    if (!drop_string_ready(core)) {
+    /* A record pulse that was owed is still up or to come: one that began meanwhile would be the same to cameras. */
+    if (!drop_string_ready(core) || firing_busy_now(&core->firing)) {
         sweep_wake(core, core->now + BOARD_TICK_HZ / 100);
         return;
     }
@@ -243,10 +244,10 @@ bool sweep_end_with_row(struct core *core)
     return true;
 }
 
-void sweep_cleared(struct core *core)
+void sweep_unrecord(struct core *core)
 {
-    if (!firing_recording(&core->firing))
-        return;
+    if (firing_busy_now(&core->firing) || !firing_recording(&core->firing))
+        return; /* what is queued at rest is that pulse */
     firing_release(&core->firing);
     firing_record(&core->firing, &core->rig, core->plan.cameras, false,
                   core->board->now(core->board->port) + FIRING_MARGIN_TICKS);

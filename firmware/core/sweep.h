@@ -70,8 +70,8 @@ void sweep_finish(struct core *core, lumi_wire_SweepEnded_How how);
 void sweep_break(struct core *core, lumi_wire_SweepEnded_How how);
 /* Goes on to the end of the row it is in; false: it is in none. */
 bool sweep_end_with_row(struct core *core);
-/* Faults are cleared: cameras that were left recording are told to stop. */
-void sweep_cleared(struct core *core);
+/* At rest, and no fault stands (any more): cameras that were left recording are told to stop. */
+void sweep_unrecord(struct core *core);
 /* The first shot that is neither fired nor lost, or how many there are. */
 uint32_t sweep_next_shot(struct core *core);
 

@@ -142,62 +142,6 @@ static void filming(struct bench *b, struct lumi_plan *plan)
     b->edge_count = 0;
 }
 
-static void recording_that_never_began_is_not_stopped(void **state)
-{
-    struct lumi_plan plan;
-
-    (void)state;
-    for (int how = 0; how < 3; how++) {
-        struct bench *b = create("bar2", NULL);
-        filming(b, &plan);
-        uint32_t crc = start(b, &plan);
-        while (b->core->state != lumi_wire_State_SWEEPING)
-            bench_beat(b);
-        assert_int_equal(b->edge_count, 0); /* queued, 20 ms ahead */
-        if (how == 2) {
-            press(b);
-        } else {
-            assert_int_equal(bench_ask(b, BENCH_REQUEST(stop, .at_once = how == 1)), lumi_wire_Result_DONE);
-        }
-        bench_run(b, 2);
-        assert_true(state_at_rest(b->core->state));
-        assert_int_equal(b->edge_count, 0);
-        if (how == 2) {
-            bench_set_input(b, BOARD_IN_ESTOP, false);
-            bench_run(b, 0.1);
-            assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_DONE);
-            bench_run(b, 1);
-            assert_int_equal(b->edge_count, 0); /* a pulse would have started them */
-        }
-        if (b->core->state == lumi_wire_State_IDLE) {
-            assert_int_equal(bench_ask(b, BENCH_REQUEST(start_sweep, .plan_crc = crc)), lumi_wire_Result_DONE);
-            bench_until(b, lumi_wire_State_IDLE, 200);
-            assert_int_equal(b->edge_count, 4);
-        }
-        bench_destroy(b);
-    }
-}
-
-static void cameras_that_record_are_stopped_by_a_stop_at_once_too(void **state)
-{
-    struct lumi_plan plan;
-
-    (void)state;
-    struct bench *b = create("bar2", NULL);
-    filming(b, &plan);
-    uint32_t crc = start(b, &plan);
-    bench_until(b, lumi_wire_State_SWEEPING, 20);
-    bench_run(b, 20);
-    assert_int_equal(b->edge_count, 2);
-    assert_int_equal(bench_ask(b, BENCH_REQUEST(stop, .at_once = true)), lumi_wire_Result_DONE);
-    bench_until(b, lumi_wire_State_IDLE, 10);
-    assert_int_equal(b->edge_count, 4);
-    assert_int_equal(bench_ask(b, BENCH_REQUEST(start_sweep, .plan_crc = crc)), lumi_wire_Result_DONE);
-    bench_until(b, lumi_wire_State_IDLE, 200);
-    assert_int_equal(b->edge_count, 8);
-    bench_destroy(b);
-}
-
 /* Sends the bench's own profile once more; `commit` would take it. */
 static void upload(struct bench *b, lumi_wire_Request *commit)
 {
@@ -538,8 +482,6 @@ int main(void)
         cmocka_unit_test(an_emergency_stop_in_mid_poll_leaves_what_has_not_begun_planned),
         cmocka_unit_test(a_stop_on_the_way_never_takes_a_shot_short_of_its_position),
         cmocka_unit_test(a_held_arms_brake_that_was_opened_by_hand_closes_before_it_moves),
-        cmocka_unit_test(recording_that_never_began_is_not_stopped),
-        cmocka_unit_test(cameras_that_record_are_stopped_by_a_stop_at_once_too),
         cmocka_unit_test(no_profile_is_taken_while_a_record_pulse_is_up),
         cmocka_unit_test(a_brake_that_an_interrupt_closed_is_known_to_be_closed),
         cmocka_unit_test(a_turn_that_was_told_wrong_does_not_tear_the_string),
