@@ -207,6 +207,10 @@ void f405_flash_fix(struct f405 *chip)
         return;
     memcpy(chip->flash_bytes + (f->fix_address - F405_FLASH), f->fix, f->fix_size);
     f->fix_size = 0;
+#if UC_API_MAJOR > 2 || UC_API_MINOR >= 1
+    /* From 2.1 on a page whose protection was waived once is written to without asking until this is forgotten. */
+    uc_ctl_flush_tlb(chip->uc);
+#endif
 }
 
 void f405_flash_event(struct f405 *chip)
