@@ -2,6 +2,7 @@
  * usage: bench_board IMAGE */
 #include "proto/mechanism/kinematics.h"
 #include "sim/board/board_client.h"
+#include "tests/scenario/board_interrupts.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,32 +17,6 @@ static void fail(const char *what, const struct lumi_error *error, struct f405_m
     const char *fault = f405_fault(f405_machine_chip(machine));
     fprintf(stderr, "bench_board: %s: %s%s%s\n", what, error->text, fault ? "; " : "", fault ? fault : "");
     exit(1);
-}
-
-static const char *name_of(int exception)
-{
-    static const struct {
-        int exception;
-        const char *name;
-    } names[] = {{14, "PendSV"},          {15, "SysTick"},         {22, "EXTI0 (e-stop)"}, {23, "EXTI1 (index)"},
-                 {24, "EXTI2 (slack)"},   {25, "EXTI3"},           {26, "EXTI4 (wound)"},  {33, "DMA1 stream 6"},
-                 {44, "TIM2 (steps)"},    {45, "TIM3 (feedback)"}, {54, "USART2"},         {56, "EXTI15_10"},
-                 {66, "TIM5 (triggers)"}, {83, "OTG_FS"}};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (names[i].exception == exception)
-            return names[i].name;
-    return "?";
-}
-
-static void print_interrupts(struct f405 *chip)
-{
-    printf("%-18s %9s %12s %12s %14s\n", "interrupt", "count", "instr mean", "instr most", "latency most");
-    for (int i = 1; i < F405_EXCEPTIONS; i++) {
-        const struct f405_exception_stats *s = f405_stats(chip, i);
-        if (s->count)
-            printf("%-18s %9llu %12.1f %12u %11llu cy\n", name_of(i), (unsigned long long)s->count,
-                   (double)s->instructions / (double)s->count, s->instructions_max, (unsigned long long)s->latency_max);
-    }
 }
 
 /* The shortest distance of two steps, and how uneven neighbours in the middle half are, in cycles. */
@@ -137,8 +112,8 @@ int main(int count, char **argument)
     f405_clear_stats(f405_machine_chip(machine));
     if (board_client_home(client, false, 0, &error) != LUMI_OK)
         fail("home", &error, machine);
-    printf("%.0f steps a turn; homing:\n", lumi_rig_steps_per_turn(&rig));
-    print_interrupts(f405_machine_chip(machine));
+    printf("%.0f steps a turn; homing, over USB:\n", lumi_rig_steps_per_turn(&rig));
+    board_print_interrupts(f405_machine_chip(machine));
     step_rates(machine, client, &rig);
     board_client_destroy(client);
     f405_machine_destroy(machine);

@@ -9,5 +9,9 @@ bench=$1/tests/bench/bench_board sweep=$1/tests/scenario/board_sweep image=$1/fi
 [ -x "$bench" ] || skip "bench_board was not built: no libunicorn-dev"
 [ -r "$image" ] || skip "no image of the firmware: no arm-none-eabi-gcc"
 machine
-LUMI_TEST_FILTER='*serial*' "$sweep" 2>/dev/null | grep ' us$'
+for name in serial usb emergency; do
+    printf '\n%s\n' "sweep, $name:"
+    LUMI_TEST_FILTER="*$name*" "$sweep" 2>/dev/null | grep -E ' us$| cy$|^interrupt|^emergency'
+done
+echo
 "$bench" "$image"

@@ -37,7 +37,8 @@ static inline const char *board_image(void)
     return image ? image : LUMI_FIRMWARE "/lumirig.bin";
 }
 
-/* arc16 with few microsteps, near its index mark, and a plan of 12 positions in 7 s: little to emulate. */
+/* arc16 with few microsteps and two feedbacks, near its index mark, and a plan of 12 positions in 7 s: little to
+ * emulate. */
 static inline void board_fixture_init(struct board_fixture *f)
 {
     struct sim_mechanics_options options;
@@ -45,6 +46,8 @@ static inline void board_fixture_init(struct board_fixture *f)
     BOARD_OK(lumi_rig_builtin("arc16", &f->rig, error));
     f->rig.microsteps = 4;
     f->rig.control.motion.home_speed = 0.5;
+    f->rig.control.triggers[3].feedback = 0;
+    f->rig.control.triggers[12].feedback = 3;
     BOARD_OK(lumi_rig_check(&f->rig, error));
     lumi_plan_init(&f->plan, &f->rig);
     f->plan.positions = 12;

@@ -1,6 +1,7 @@
 /* The bytes that are flashed, run unchanged on the emulated STM32F405 in a simulated rig: commands over both links,
  * a sweep whose pulses on the pins are held against its plan, an emergency stop, and power that goes in a write. */
 #include "board_fixture.h"
+#include "board_interrupts.h"
 
 #include "proto/mechanism/kinematics.h"
 
@@ -148,6 +149,7 @@ static void sweep(struct board_fixture *f)
     lumi_wire_SweepEnded ended;
     int from, count;
     BOARD_OK(board_client_load_plan(f->client, &f->plan, error));
+    f405_clear_stats(f405_machine_chip(f->machine)); /* the profile is in flash: an erase holds every interrupt off */
     lumi_wire_Status before = board_fixture_status(f);
     f405_machine_forget_edges(f->machine);
     board_client_events(f->client, &from);
@@ -164,6 +166,7 @@ static void sweep(struct board_fixture *f)
     judge_steps(f, before.step, after.step, trigger[0].at, trigger[count - 1].at);
     sim_mechanics_exposures(f405_machine_mechanics(f->machine), &count);
     assert_int_equal(count, f->plan.positions * f->rig.camera_count);
+    board_print_interrupts(f405_machine_chip(f->machine));
 }
 
 static void a_board_is_configured_homed_and_sweeps_over_its_serial_line(void **state)
@@ -214,6 +217,7 @@ static void an_emergency_stop_ends_the_steps_at_once_and_the_sweep_goes_on_after
     board_fixture_connect(&f, BOARD_LINK_USB);
     struct sim_mechanics *mechanics = f405_machine_mechanics(f.machine);
     BOARD_OK(board_client_configure(f.client, &f.rig, error));
+    f405_clear_stats(f405_machine_chip(f.machine));
     BOARD_OK(board_client_home(f.client, false, 0, error));
     BOARD_OK(board_client_load_plan(f.client, &f.plan, error));
     BOARD_OK(board_client_start(f.client, &f.plan, 0, false, error));
@@ -250,6 +254,7 @@ static void an_emergency_stop_ends_the_steps_at_once_and_the_sweep_goes_on_after
     status = board_fixture_status(&f);
     assert_int_equal(status.shots_fired, f.plan.positions);
     assert_int_equal(status.shots_lost, 0);
+    board_print_interrupts(f405_machine_chip(f.machine));
     board_fixture_finish(&f);
 }
 
