@@ -377,6 +377,35 @@ static bool judge_recording(struct rig_operator *o)
     return before == after || wrong(o, "%d frames after the video's end", after - before);
 }
 
+/* A video that was told complete was filmed: every camera whose line lives has, all around, frames of every turn. */
+static bool judge_filmed(struct rig_operator *o)
+{
+    enum { BINS = 72 };
+    static int frames[LUMI_RIG_CAMERAS][BINS];
+    int count, starts;
+    const struct sim_video_frame *video = sim_mechanics_video(sim_machine_mechanics(o->f.machine), &count);
+
+    sim_machine_start_ticks(o->f.machine, &starts);
+    if (!o->f.options.mechanics.video || starts > 1) /* a restart forgets that cameras record: rig.md warns of it */
+        return true;
+    for (int i = 0; i < o->script.count; i++)
+        if (o->script.faults[i].kind == SIM_FAULT_CAMERA_DEAD)
+            return true;
+    memset(frames, 0, sizeof frames);
+    for (int i = 0; i < count; i++) {
+        double turns = video[i].angle / (2 * LUMI_PI);
+        int bin = (int)((turns - floor(turns)) * BINS);
+        frames[video[i].camera][bin < BINS ? bin : BINS - 1]++;
+    }
+    /* 30 a second and 10 s a turn: four in each twelfth of 60 degrees. */
+    for (int camera = 0; camera < o->f.rig.camera_count; camera++)
+        for (int bin = 0; bin < BINS; bin++)
+            if (frames[camera][bin] < 2 * o->f.plan.turns)
+                return wrong(o, "camera %d has %d frames about %d degrees, in %d turns", camera, frames[camera][bin],
+                             bin * 360 / BINS, o->f.plan.turns);
+    return true;
+}
+
 bool rig_operator_judge(struct rig_operator *o)
 {
     struct sim_mechanics *m = sim_machine_mechanics(o->f.machine);
@@ -385,5 +414,5 @@ bool rig_operator_judge(struct rig_operator *o)
         return wrong(o, "the arm fell by %g degrees", sim_mechanics_fallen(m) / DEGREE);
     if (sim_machine_events_lost(o->f.machine) == 0 && (!judge_shots(o) || !judge_map(o) || !judge_states(o)))
         return false;
-    return judge_estop(o) && judge_recording(o);
+    return judge_estop(o) && judge_recording(o) && judge_filmed(o);
 }
