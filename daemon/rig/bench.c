@@ -161,21 +161,16 @@ done:
 static int write_whole(struct lumi_rig_link *link, const uint8_t *data, size_t size, bool replace_newer,
                        struct lumi_error *error)
 {
-    lumi_wire_Request request = {.which_command = lumi_wire_Request_write_profile_tag};
-    lumi_wire_WriteProfile *part = &request.command.write_profile;
+    lumi_wire_Request request;
+    size_t at = 0;
 
-    for (size_t offset = 0; offset < size; offset += part->data.size) {
-        part->offset = (uint32_t)offset;
-        part->data.size = (pb_size_t)MIN(size - offset, sizeof part->data.bytes);
-        memcpy(part->data.bytes, data + offset, part->data.size);
-        LUMI_TRY(lumi_rig_link_command(link, &request, ANSWER_SECONDS, NULL, error));
+    while (lumi_wire_profile_request(data, size, &at, &request)) {
+        bool commit = request.which_command == lumi_wire_Request_commit_profile_tag;
+        if (commit)
+            request.command.commit_profile.replace_newer = replace_newer;
+        LUMI_TRY(lumi_rig_link_command(link, &request, commit ? FLASH_SECONDS : ANSWER_SECONDS, NULL, error));
     }
-    memset(&request, 0, sizeof request);
-    request.which_command = lumi_wire_Request_commit_profile_tag;
-    request.command.commit_profile.size = (uint32_t)size;
-    request.command.commit_profile.crc = lumi_crc32c(0, data, size);
-    request.command.commit_profile.replace_newer = replace_newer;
-    return lumi_rig_link_command(link, &request, FLASH_SECONDS, NULL, error);
+    return LUMI_OK;
 }
 
 int lumi_rig_bench_write_profile(struct lumi_rig_link *link, const struct lumi_rig *rig, bool replace_newer,

@@ -47,7 +47,7 @@ struct lumi_drive_map {
     double move_timeout;    /* s, for a move from one position to the next; and for homing */
     double home_timeout;
     struct lumi_drive_register status, position, fault_code, target, speed;
-    double speed_counts_per_s; /* what is written to `speed`, once, before a sweep; 0: nothing */
+    double speed_counts_per_s; /* what is written to `speed` before every start; 0: nothing */
     struct lumi_drive_bit enabled, ready, reached, fault, homed;
     struct lumi_drive_command start, stop, reset, home;
 };

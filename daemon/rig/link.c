@@ -222,24 +222,11 @@ int lumi_rig_link_command(struct lumi_rig_link *link, const lumi_wire_Request *r
                           lumi_wire_Reply *reply, struct lumi_error *error)
 {
     lumi_wire_Reply own;
-    const char *text;
 
     if (!reply)
         reply = &own;
     LUMI_TRY(lumi_rig_link_request(link, request, seconds, reply, error));
-    text = reply->text[0] ? reply->text : "no reason given";
-    switch (reply->result) {
-    case lumi_wire_Result_DONE:
-        return LUMI_OK;
-    case lumi_wire_Result_REFUSED:
-        return lumi_fail(error, LUMI_ERR_BUSY, "the board refuses: %s", text);
-    case lumi_wire_Result_BAD:
-        return lumi_fail(error, LUMI_ERR_FORMAT, "the board: %s", text);
-    case lumi_wire_Result_UNSUPPORTED:
-        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "the board cannot do this: %s", text);
-    default:
-        return lumi_fail(error, LUMI_ERR_IO, "the board failed: %s", text);
-    }
+    return lumi_wire_reply_result(reply, error);
 }
 
 bool lumi_rig_link_emergency_stop(struct lumi_rig_link *link)

@@ -49,7 +49,6 @@ struct lumi_rig_link {
     uint64_t now_ns, opened_ns, try_ns;
     uint64_t answered_ns; /* when there last was a session */
     uint64_t received;    /* bytes since it was opened */
-    uint32_t frames;      /* of the client's deframer, when heard_ns was set */
     uint8_t out[LUMI_RIG_LINK_OUT];
     size_t out_size;
 };

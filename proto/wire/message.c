@@ -189,3 +189,21 @@ const char *lumi_wire_state_name(lumi_wire_State state)
 
     return (unsigned)state < sizeof names / sizeof names[0] ? names[state] : NULL;
 }
+
+int lumi_wire_reply_result(const lumi_wire_Reply *reply, struct lumi_error *error)
+{
+    const char *text = reply->text[0] ? reply->text : "no reason given";
+
+    switch (reply->result) {
+    case lumi_wire_Result_DONE:
+        return LUMI_OK;
+    case lumi_wire_Result_REFUSED:
+        return lumi_fail(error, LUMI_ERR_BUSY, "the board refuses: %s", text);
+    case lumi_wire_Result_BAD:
+        return lumi_fail(error, LUMI_ERR_FORMAT, "the board: %s", text);
+    case lumi_wire_Result_UNSUPPORTED:
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "the board cannot do this: %s", text);
+    default:
+        return lumi_fail(error, LUMI_ERR_IO, "the board failed: %s", text);
+    }
+}

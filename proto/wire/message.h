@@ -55,6 +55,12 @@ int lumi_wire_to_plan(const lumi_wire_Plan *message, struct lumi_plan *plan, str
 /* CRC-32C of the encoded plan: what StartSweep names. */
 uint32_t lumi_wire_plan_crc(const struct lumi_plan *plan);
 
+/* For hosts. The requests that write an encoded profile to the board, in order: part after part, then the commit. `at`
+ * is 0 before the first and moves on; false: there is no further one. */
+bool lumi_wire_profile_request(const uint8_t *data, size_t size, size_t *at, lumi_wire_Request *request);
+/* LUMI_OK for DONE; otherwise LUMI_ERR_BUSY (refused), _FORMAT (bad), _UNSUPPORTED or _IO, with what the board says. */
+int lumi_wire_reply_result(const lumi_wire_Reply *reply, struct lumi_error *error);
+
 #ifdef __cplusplus
 }
 #endif

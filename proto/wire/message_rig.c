@@ -328,3 +328,27 @@ uint32_t lumi_wire_plan_crc(const struct lumi_plan *plan)
     lumi_wire_from_plan(plan, &message);
     return pb_encode(&stream, lumi_wire_Plan_fields, &message) ? lumi_crc32c(0, data, stream.bytes_written) : 0;
 }
+
+bool lumi_wire_profile_request(const uint8_t *data, size_t size, size_t *at, lumi_wire_Request *request)
+{
+    lumi_wire_WriteProfile *part = &request->command.write_profile;
+    lumi_wire_CommitProfile *commit = &request->command.commit_profile;
+
+    if (*at > size)
+        return false;
+    memset(request, 0, sizeof *request);
+    if (*at == size) {
+        request->which_command = lumi_wire_Request_commit_profile_tag;
+        commit->size = (uint32_t)size;
+        commit->crc = lumi_crc32c(0, data, size);
+        *at = size + 1;
+        return true;
+    }
+    size_t take = size - *at < sizeof part->data.bytes ? size - *at : sizeof part->data.bytes;
+    request->which_command = lumi_wire_Request_write_profile_tag;
+    part->offset = (uint32_t)*at;
+    part->data.size = (pb_size_t)take;
+    memcpy(part->data.bytes, data + *at, take);
+    *at += take;
+    return true;
+}

@@ -230,16 +230,7 @@ int board_client_request(struct board_client *c, lumi_wire_Request *request, lum
         return lumi_fail(error, LUMI_ERR_IO, "%s", c->lost ? "lost with a restart" : "no answer");
     if (answer)
         *answer = c->reply;
-    switch (c->reply.result) {
-    case lumi_wire_Result_DONE:
-        return LUMI_OK;
-    case lumi_wire_Result_REFUSED:
-        return lumi_fail(error, LUMI_ERR_BUSY, "refused: %s", c->reply.text);
-    case lumi_wire_Result_BAD:
-        return lumi_fail(error, LUMI_ERR_FORMAT, "bad: %s", c->reply.text);
-    default:
-        return lumi_fail(error, LUMI_ERR_IO, "result %d: %s", (int)c->reply.result, c->reply.text);
-    }
+    return lumi_wire_reply_result(&c->reply, error);
 }
 
 /* ---- commands ---- */
@@ -251,20 +242,11 @@ int board_client_configure(struct board_client *c, const struct lumi_rig *rig, s
     size_t size = lumi_wire_encode_profile(rig, scratch, bytes, LUMI_WIRE_PROFILE_MAX);
     if (size == 0)
         return lumi_fail(error, LUMI_ERR_ARG, "the profile cannot be encoded");
-    for (size_t at = 0; at < size;) {
-        lumi_wire_Request request = {.which_command = lumi_wire_Request_write_profile_tag};
-        lumi_wire_WriteProfile *part = &request.command.write_profile;
-        size_t take = MIN(size - at, sizeof part->data.bytes);
-        part->offset = (uint32_t)at;
-        part->data.size = (pb_size_t)take;
-        memcpy(part->data.bytes, bytes + at, take);
+    lumi_wire_Request request;
+    size_t at = 0;
+    while (lumi_wire_profile_request(bytes, size, &at, &request))
         LUMI_TRY(board_client_request(c, &request, NULL, error));
-        at += take;
-    }
-    lumi_wire_Request commit = {.which_command = lumi_wire_Request_commit_profile_tag};
-    commit.command.commit_profile.size = (uint32_t)size;
-    commit.command.commit_profile.crc = lumi_crc32c(0, bytes, size);
-    return board_client_request(c, &commit, NULL, error);
+    return LUMI_OK;
 }
 
 int board_client_status(struct board_client *c, lumi_wire_Status *status, struct lumi_error *error)

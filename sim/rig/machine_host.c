@@ -94,16 +94,7 @@ int sim_machine_request(struct sim_machine *m, lumi_wire_Request *request, lumi_
         return lumi_fail(error, LUMI_ERR_IO, "the board restarted with a request in flight");
     if (reply)
         *reply = m->reply;
-    switch (m->reply.result) {
-    case lumi_wire_Result_DONE:
-        return LUMI_OK;
-    case lumi_wire_Result_REFUSED:
-        return lumi_fail(error, LUMI_ERR_BUSY, "refused: %s", m->reply.text);
-    case lumi_wire_Result_BAD:
-        return lumi_fail(error, LUMI_ERR_FORMAT, "bad: %s", m->reply.text);
-    default:
-        return lumi_fail(error, LUMI_ERR_IO, "result %d: %s", (int)m->reply.result, m->reply.text);
-    }
+    return lumi_wire_reply_result(&m->reply, error);
 }
 
 int sim_machine_configure(struct sim_machine *m, const struct lumi_rig *rig, struct lumi_error *error)
@@ -112,25 +103,13 @@ int sim_machine_configure(struct sim_machine *m, const struct lumi_rig *rig, str
     g_autofree uint8_t *bytes = g_malloc(LUMI_WIRE_PROFILE_MAX);
     size_t size = lumi_wire_encode_profile(rig, scratch, bytes, LUMI_WIRE_PROFILE_MAX);
     lumi_wire_Request request;
+    size_t at = 0;
 
     if (size == 0)
         return lumi_fail(error, LUMI_ERR_ARG, "the profile cannot be encoded");
-    for (size_t at = 0; at < size;) {
-        memset(&request, 0, sizeof request);
-        request.which_command = lumi_wire_Request_write_profile_tag;
-        lumi_wire_WriteProfile *part = &request.command.write_profile;
-        size_t take = MIN(size - at, sizeof part->data.bytes);
-        part->offset = (uint32_t)at;
-        part->data.size = (pb_size_t)take;
-        memcpy(part->data.bytes, bytes + at, take);
+    while (lumi_wire_profile_request(bytes, size, &at, &request))
         LUMI_TRY(sim_machine_request(m, &request, NULL, error));
-        at += take;
-    }
-    memset(&request, 0, sizeof request);
-    request.which_command = lumi_wire_Request_commit_profile_tag;
-    request.command.commit_profile.size = (uint32_t)size;
-    request.command.commit_profile.crc = lumi_crc32c(0, bytes, size);
-    return sim_machine_request(m, &request, NULL, error);
+    return LUMI_OK;
 }
 
 struct awaited {
