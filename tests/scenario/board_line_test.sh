@@ -8,24 +8,11 @@ lumi=$1 serve=$2 image=$3
 }
 # shellcheck source=tests/scenario/expect.sh
 . "$(dirname "$0")/expect.sh"
+# shellcheck source=tests/scenario/rig_line.sh
+. "$(dirname "$0")/rig_line.sh"
 cd "$scratch" || exit 1
 
-mkfifo control
-"$serve" "$image" board.rig 3 <control >terminal &
-exec 7>control
-tries=0
-until [ -s terminal ]; do
-    tries=$((tries + 1))
-    [ $tries -lt 600 ] || fail "no emulated board"
-    sleep 0.05
-done
-board=$(cat terminal)
-rig() {
-    what=$1
-    shift
-    # shellcheck disable=SC2086
-    "$lumi" rig $what -l "$board" "$@"
-}
+serve_line "$serve" "$image" board.rig 3
 cat >short.plan <<'PLAN'
 [sweep]
 mode = continuous
@@ -43,9 +30,7 @@ cmp got board.rig || fail "another profile came back"
 expect_line 1 "lost" rig run short.plan
 rig home || fail "home"
 rig run short.plan --log sweep.jsonl || fail "the sweep: $(tail -3 sweep.jsonl)"
-grep -o '"shot":[0-9]*,"lost":false' sweep.jsonl | tr -dc '0-9\n' | sort -n >had
-seq 0 11 >wanted
-cmp had wanted || fail "the log does not hold every shot once"
+each_once sweep.jsonl 12
 expect 0 "state     idle" rig status
 exec 7>&-
 wait

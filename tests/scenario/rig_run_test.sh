@@ -5,24 +5,11 @@
 lumi=$1 serve=$2
 # shellcheck source=tests/scenario/expect.sh
 . "$(dirname "$0")/expect.sh"
+# shellcheck source=tests/scenario/rig_line.sh
+. "$(dirname "$0")/rig_line.sh"
 cd "$scratch" || exit 1
 
-mkfifo control
-"$serve" arc16 40 <control >terminal &
-exec 7>control
-tries=0
-until [ -s terminal ]; do
-    tries=$((tries + 1))
-    [ $tries -lt 200 ] || fail "no simulated rig"
-    sleep 0.05
-done
-board=$(cat terminal)
-rig() {
-    what=$1
-    shift
-    # shellcheck disable=SC2086
-    "$lumi" rig $what -l "$board" "$@"
-}
+serve_line "$serve" arc16 40
 shots_in() { # LOG: how many lines say that a shot was fired
     grep -c '"shot":[0-9]*,"lost":false' "$1"
 }
@@ -33,11 +20,6 @@ await_shots() { # LOG COUNT
         [ $tries -lt 1200 ] || fail "no $2 shots in $1"
         sleep 0.05
     done
-}
-each_once() { # LOG COUNT: shots 0 to COUNT - 1, each fired once
-    grep -o '"shot":[0-9]*,"lost":false' "$1" | tr -dc '0-9\n' | sort -n >had
-    seq 0 $(($2 - 1)) >wanted
-    cmp -s had wanted || fail "$1 does not hold every shot once: $(diff had wanted | head -5)"
 }
 
 # A new board.
