@@ -340,11 +340,6 @@ size_t host_board_link_pull(struct host_board *board, enum board_link link, uint
     return host_queue_get(&board->links[link].out, data, size);
 }
 
-size_t host_board_link_waiting(const struct host_board *board, enum board_link link)
-{
-    return board->links[link].out.count;
-}
-
 void host_board_link_set_up(struct host_board *board, enum board_link link, bool up)
 {
     board->links[link].up = up;

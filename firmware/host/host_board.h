@@ -69,7 +69,6 @@ void host_board_feedback(struct host_board *board, int input, bool active, uint6
 /* Links, seen from the far end: bytes towards the board (returns how many fit), bytes from it. */
 size_t host_board_link_push(struct host_board *board, enum board_link link, const uint8_t *data, size_t size);
 size_t host_board_link_pull(struct host_board *board, enum board_link link, uint8_t *data, size_t size);
-size_t host_board_link_waiting(const struct host_board *board, enum board_link link); /* bytes to pull */
 void host_board_link_set_up(struct host_board *board, enum board_link link, bool up);
 
 /* Resets, power, and the main loop hanging (interrupts go on; the watchdog bites after its time). */

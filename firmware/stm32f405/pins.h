@@ -9,7 +9,7 @@
 #ifndef LUMI_FIRMWARE_STM32F405_PINS_H
 #define LUMI_FIRMWARE_STM32F405_PINS_H
 
-/* Hz. The crystal, and what RCC makes of it (clock.c). */
+/* Hz. The crystal, and what RCC makes of it (f405_clock.c). */
 #define CLOCK_HSE 8000000u
 #define CLOCK_SYSCLK 168000000u
 #define CLOCK_APB1 42000000u

@@ -35,11 +35,6 @@ static struct {
     uint8_t text[USB_STRING_MAX];
 } control;
 
-bool usb_configured(void)
-{
-    return control.configuration != 0;
-}
-
 static void configure(uint8_t configuration)
 {
     if (control.configuration) {

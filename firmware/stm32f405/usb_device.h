@@ -36,7 +36,6 @@ void usb_bulk_receive(void);                          /* lets one packet in */
 void usb_control_reset(void);
 void usb_control_setup(const uint8_t bytes[8]);
 void usb_control_sent(void);
-bool usb_configured(void);
 
 /* usb_link.c, told by usb_otg.c and usb_control.c */
 void usb_link_open(void);

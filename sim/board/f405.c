@@ -560,29 +560,9 @@ uint64_t f405_instructions(const struct f405 *chip)
     return chip->instructions;
 }
 
-uint32_t f405_pc(const struct f405 *chip)
-{
-    return chip->block_address;
-}
-
 uint32_t f405_resets(const struct f405 *chip)
 {
     return chip->resets;
-}
-
-bool f405_is_on(const struct f405 *chip)
-{
-    return chip->on;
-}
-
-bool f405_flash_busy(const struct f405 *chip)
-{
-    return chip->flash.done != F405_NEVER;
-}
-
-const uint8_t *f405_flash_data(const struct f405 *chip)
-{
-    return chip->flash_bytes;
 }
 
 const struct f405_exception_stats *f405_stats(const struct f405 *chip, int exception)

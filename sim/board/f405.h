@@ -58,7 +58,6 @@ struct f405_exception_stats {
 struct f405 *f405_create(const struct f405_ops *ops, void *context);
 void f405_destroy(struct f405 *chip);
 bool f405_flash_load(struct f405 *chip, uint32_t address, const void *data, size_t size);
-const uint8_t *f405_flash_data(const struct f405 *chip);
 void f405_set_unique_id(struct f405 *chip, const uint8_t id[12]);
 
 /* Power comes back with a power-on reset. Going, it leaves a flash operation half done: a sector's bits partly erased,
@@ -73,12 +72,9 @@ void f405_request_stop(struct f405 *chip);
 uint64_t f405_now(const struct f405 *chip);
 const char *f405_fault(const struct f405 *chip); /* NULL: none */
 uint64_t f405_instructions(const struct f405 *chip);
-uint32_t f405_pc(const struct f405 *chip);
 uint32_t f405_resets(const struct f405 *chip); /* since creation, power-on included */
-bool f405_flash_busy(const struct f405 *chip); /* an erase or a write is going on */
 /* The power goes in the middle of the n-th erase or write of the flash from now; 0: not. */
 void f405_cut_in_flash(struct f405 *chip, unsigned operation);
-bool f405_is_on(const struct f405 *chip);
 const struct f405_exception_stats *f405_stats(const struct f405 *chip, int exception);
 void f405_clear_stats(struct f405 *chip);
 

@@ -215,11 +215,6 @@ int64_t sim_mechanics_steps(const struct sim_mechanics *m)
     return m->platform.count;
 }
 
-double sim_mechanics_field(const struct sim_mechanics *m)
-{
-    return m->platform.field;
-}
-
 void sim_mechanics_pose(const struct sim_mechanics *m, int camera, struct lumi_pose *pose)
 {
     lumi_rig_camera_pose_at(&m->truth, camera, sim_mechanics_angle(m), sim_mechanics_drop(m), pose);

@@ -81,7 +81,6 @@ double sim_mechanics_dropped(const struct sim_mechanics *mechanics);
 int64_t sim_mechanics_missed_steps(const struct sim_mechanics *mechanics); /* full steps */
 int64_t sim_mechanics_steps(const struct sim_mechanics *mechanics); /* pulses so far, backward ones counted down */
 /* The place, in microsteps of the truth, to which the motor's field points: where the platform comes to rest. */
-double sim_mechanics_field(const struct sim_mechanics *mechanics);
 void sim_mechanics_pose(const struct sim_mechanics *mechanics, int camera, struct lumi_pose *pose);
 
 /* What the cameras did, one record an exposure, in order of their triggers. */

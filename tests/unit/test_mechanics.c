@@ -279,11 +279,46 @@ static void cameras_lag_expose_and_lose_triggers_while_busy(void **state)
     sim_mechanics_destroy(bench.m);
 }
 
+/* What the lenses of simulated cameras are given: the pose of every camera at any instant, a swing included. */
+static void cameras_are_where_platform_and_arm_truly_are(void **state)
+{
+    struct bench bench;
+    struct lumi_pose pose, start;
+    (void)state;
+
+    bench_rig(&bench, "bar2");
+    bench.options.start_turns = 0;
+    bench_start(&bench);
+    double per_turn = lumi_rig_steps_per_turn(&bench.rig);
+    sim_mechanics_pose(bench.m, 0, &start);
+    steps(&bench, (int)(per_turn * 1.25), per_turn / 20, 400, true);
+    for (int i = 0; i < 3; i++) { /* just after the stop, while it swings, and at rest */
+        for (int camera = 0; camera < 2; camera++) {
+            const struct lumi_rig_camera *c = &bench.rig.cameras[camera];
+            double arm = c->angle - sim_mechanics_drop(bench.m), heading = sim_mechanics_angle(bench.m) + c->azimuth;
+            sim_mechanics_pose(bench.m, camera, &pose);
+            assert_true(fabs(pose.t.x - c->radius * cos(arm) * cos(heading)) < 1e-9);
+            assert_true(fabs(pose.t.y - c->radius * cos(arm) * sin(heading)) < 1e-9);
+            assert_true(fabs(pose.t.z - c->radius * sin(arm)) < 1e-9);
+            assert_true(fabs(pose.r[2] * c->radius - pose.t.x) < 1e-9); /* it looks outwards */
+        }
+        run_to(&bench, bench.now + TICK(i == 0 ? 0.05 : 5));
+    }
+    /* At rest: a quarter of a turn on, and lower by what the string has paid out. */
+    struct lumi_pose planned;
+    lumi_rig_camera_pose(&bench.rig, 0, lumi_rig_step_turns(&bench.rig, (int)(per_turn * 1.25)), &planned);
+    sim_mechanics_pose(bench.m, 0, &pose);
+    assert_true(lumi_length(lumi_sub(pose.t, planned.t)) < 0.002);
+    assert_true(lumi_length(lumi_sub(pose.t, start.t)) > 0.1);
+    sim_mechanics_destroy(bench.m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_oscillator_is_exact_however_long_the_step),
         cmocka_unit_test(the_platform_follows_the_pulses),
+        cmocka_unit_test(cameras_are_where_platform_and_arm_truly_are),
         cmocka_unit_test(an_abrupt_start_beyond_the_torque_loses_whole_motor_steps),
         cmocka_unit_test(a_sudden_stop_swings_and_a_weak_arm_swings_longer),
         cmocka_unit_test(the_index_switch_closes_at_its_mark_and_bounces),
