@@ -1,0 +1,57 @@
+/* Is this frame good? Numbers from the picture itself, from the frames beside it, and a verdict. No thread, no clock,
+ * no file but those it is given. */
+#ifndef LUMI_DAEMON_JUDGE_JUDGE_H
+#define LUMI_DAEMON_JUDGE_JUDGE_H
+
+#include "proto/base/geometry.h"
+#include "proto/base/lens.h"
+#include "proto/base/result.h"
+#include "proto/capture/capture.h"
+
+struct lumi_camera_frame;
+
+/* A frame made small, with what is computed of it once; kept of the latest frames of every camera. Allocated. */
+struct lumi_judge_picture;
+/* Decodes (JPEG, Bayer, YUV, a file) at a fraction of its size where that is enough. LUMI_ERR_FORMAT: it is no picture.
+ */
+int lumi_judge_picture_create(const struct lumi_camera_frame *frame, struct lumi_judge_picture **picture,
+                              struct lumi_error *error);
+void lumi_judge_picture_destroy(struct lumi_judge_picture *picture);
+
+struct lumi_judge_numbers {
+    double sharpness; /* share of the detail that an ideal lens would leave; comparable between frames of one camera */
+    double blur_pixels;    /* length of the smear along its direction, from the picture's spectrum; 0: none seen */
+    double clipped;        /* share of pixels at white */
+    double dark;           /* share at black */
+    double mean;           /* linear, 0..1 */
+    double exposure_stops; /* against neighbours, where they overlap; NaN: no neighbour */
+    double shift_pixels;   /* of the picture against where its pose says it looks, from its neighbours; NaN unknown */
+    double moved;          /* share of the overlap that differs beyond parallax and noise: things that moved */
+};
+struct lumi_judge_neighbour {
+    const struct lumi_judge_picture *picture;
+    const struct lumi_lens *lens;
+    struct lumi_pose pose;
+    double exposure_s, gain; /* as reported; 0: unknown */
+};
+struct lumi_judge_limits {
+    double sharpness_share; /* of the median of the camera's frames so far, below which it is rejected (0.5) */
+    double blur_pixels;     /* (2) */
+    double clipped;         /* (0.25) */
+    double exposure_stops;  /* (0.5) */
+    double shift_pixels;    /* (8) */
+    double moved;           /* (0.05): a warning, no rejection, unless reject_moved */
+    bool reject_moved;
+};
+void lumi_judge_limits_init(struct lumi_judge_limits *limits);
+
+int lumi_judge_measure(const struct lumi_judge_picture *picture, const struct lumi_lens *lens,
+                       const struct lumi_pose *pose, double exposure_s, double gain,
+                       const struct lumi_judge_neighbour *neighbours, int count, struct lumi_judge_numbers *numbers,
+                       struct lumi_error *error);
+/* Whether it is accepted; `reason` (one line, "" where there is nothing to say) also holds warnings. `usual_sharpness`:
+ * the median of the camera's accepted frames, 0 where there are none yet. */
+bool lumi_judge_verdict(const struct lumi_judge_numbers *numbers, const struct lumi_judge_limits *limits,
+                        double usual_sharpness, char *reason, size_t size);
+
+#endif

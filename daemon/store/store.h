@@ -1,0 +1,128 @@
+/* The way to the disk: a capture (proto/capture) behind a queue, written as fast as the disk goes, a second copy beside
+ * it. Jobs are done in the order they were given as far as one frame is concerned; a job that is done is on the disk
+ * and committed.
+ *
+ * 1. Memory is bounded: lumi_store_room says how many bytes may still be given; what is over is refused
+ * (LUMI_ERR_LIMIT).
+ * 2. What was reported done survives a kill and a pulled plug. What was not is done whole or not at all.
+ * 3. The second copy never holds the first one up: where it lags, it is filled in later, from the first.
+ * 4. With `synchronous` nothing happens but in lumi_store_work, so that a slow disk can be simulated in virtual time.
+ */
+#ifndef LUMI_DAEMON_STORE_STORE_H
+#define LUMI_DAEMON_STORE_STORE_H
+
+#include "proto/capture/capture.h"
+#include "proto/mechanism/sweep_plan.h"
+
+#include <sys/uio.h>
+
+struct lumi_store;
+
+enum lumi_store_job_kind {
+    LUMI_STORE_PLAN = 0, /* rows of positions, shots and frames for a plan: see lumi_store_plan */
+    LUMI_STORE_SHOT,     /* a shot was fired, or lost: rows of its frames triggered */
+    LUMI_STORE_EXPOSED,  /* a sync edge */
+    LUMI_STORE_FRAME,    /* bytes of a frame */
+    LUMI_STORE_LOST,     /* a frame that will never come */
+    LUMI_STORE_JUDGED,
+    LUMI_STORE_RETAKE,   /* a new planned frame for a rejected one; done.frame is its id */
+    LUMI_STORE_INCIDENT, /* one line for the capture's log: dropped, doubled, late, camera gone … */
+    LUMI_STORE_SWEEP,    /* a sweep begins or has ended: clock fits, residuals, how */
+    LUMI_STORE_META,
+    LUMI_STORE_SEAL /* everything is synced, verified against its checksums if asked, and the bag closed */
+};
+
+#define LUMI_STORE_IOV 4
+struct lumi_store_job {
+    enum lumi_store_job_kind kind;
+    uint64_t id;   /* the giver's; comes back */
+    int64_t frame; /* row; FRAME, EXPOSED, LOST, JUDGED, RETAKE */
+    /* SHOT */
+    int64_t shot;                         /* row */
+    int64_t trigger_us[LUMI_RIG_CAMERAS]; /* by camera of the rig; LUMI_NO_TIME: not fired */
+    /* EXPOSED */
+    int64_t exposed_us;
+    /* FRAME: the file is these pieces one after another, or the file at `path`. They stay valid until the job is done.
+     */
+    struct iovec pieces[LUMI_STORE_IOV];
+    int piece_count;
+    const char *path;
+    /* FRAME: called in a writer's thread before the bytes are wanted, where they have still to be made (may be NULL);
+     * fills in pieces and file. `bytes` says about how many they will be. */
+    int (*prepare)(void *context, struct lumi_store_job *job, struct lumi_error *error);
+    void *context;
+    size_t bytes;
+    struct lumi_capture_file file;
+    /* JUDGED */
+    bool accepted;
+    double sharpness, blur_pixels, clipped, exposure_stops, shift_pixels, moved;
+    /* JUDGED, LOST, INCIDENT, RETAKE, SWEEP: why; META: the value */
+    char text[512];
+    char key[64];    /* META; INCIDENT: its kind */
+    int camera;      /* INCIDENT: of the rig, −1 none */
+    int64_t time_us; /* INCIDENT, SWEEP: Unix time */
+    int sweep;       /* SWEEP: its number in the capture */
+    bool ended;
+    bool verify; /* SEAL: every file is read again first */
+    char date[16];
+};
+
+struct lumi_store_done {
+    uint64_t id;
+    enum lumi_store_job_kind kind;
+    int code; /* LUMI_ERR_NOSPACE and the like; the frame is then as it was before */
+    char text[512];
+    int64_t frame; /* RETAKE: the new row */
+    size_t bytes;
+    double seconds; /* from given to done */
+};
+
+struct lumi_store_options {
+    size_t memory;               /* bytes of frames that may wait (512 MiB) */
+    const char *second_copy;     /* a directory on another disk; NULL: none */
+    int writers;                 /* threads; 0: by the number of processors */
+    bool synchronous;            /* no threads: lumi_store_work does the work, for virtual time */
+    void (*wake)(void *context); /* when something is done */
+    /* What a disk would answer, for simulated ones: LUMI_OK, or a code with its text (LUMI_ERR_NOSPACE) in place of
+     * writing so many bytes; asked before every file. NULL: the disk itself answers. */
+    int (*disk)(void *context, size_t bytes, struct lumi_error *error);
+    void *context;
+};
+void lumi_store_options_init(struct lumi_store_options *options);
+
+/* The capture is open for writing and becomes the store's, also on failure of later jobs; lumi_store_close closes it.
+ */
+int lumi_store_open(struct lumi_capture *capture, const struct lumi_store_options *options, struct lumi_store **store,
+                    struct lumi_error *error);
+/* Finishes what was given, then closes. */
+int lumi_store_close(struct lumi_store *store, struct lumi_error *error);
+
+/* Copies the job (not the pieces). LUMI_ERR_LIMIT: no room for its bytes. */
+int lumi_store_give(struct lumi_store *store, const struct lumi_store_job *job, struct lumi_error *error);
+bool lumi_store_done(struct lumi_store *store, struct lumi_store_done *done); /* the next; false: none */
+/* synchronous: does at most `jobs` jobs (0: all) on this thread. */
+void lumi_store_work(struct lumi_store *store, int jobs);
+
+struct lumi_store_figures {
+    size_t room, waiting; /* bytes */
+    int jobs;             /* that wait */
+    int64_t stored_bytes;
+    double bytes_per_second;   /* of the last seconds; 0 idle */
+    double slowest_seconds;    /* a job of the last minute took */
+    int64_t copy_behind_bytes; /* of the second copy */
+    int copy_code;             /* not 0: the second copy is given up */
+    char copy_text[256];
+};
+void lumi_store_figures(struct lumi_store *store, struct lumi_store_figures *figures);
+
+/* Before a sweep: free bytes where `path` lies, and what writing there gives, by writing `bytes` and taking them away.
+ */
+int lumi_store_disk(const char *path, int64_t *free_bytes, struct lumi_error *error);
+int lumi_store_measure(const char *path, size_t bytes, double *bytes_per_second, struct lumi_error *error);
+
+/* Rows for a plan of this rig, in a capture that has none: cameras, lenses, positions, shots, frames with their prior
+ * poses (proto/mechanism/kinematics.h), names "cCC-tTT-pPPP[-bB]", profile and plan as text. In one transaction. */
+int lumi_store_plan(struct lumi_capture *capture, const struct lumi_rig *rig, const struct lumi_plan *plan,
+                    struct lumi_error *error);
+
+#endif
