@@ -1,0 +1,2 @@
+# The virtual machine itself.
+lumi_vm(boot)
