@@ -1,0 +1,1 @@
+lumi_test(test_lumid_config FOLDERS lumid base)
