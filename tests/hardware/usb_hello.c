@@ -187,7 +187,7 @@ static void unplugging(void)
     uint8_t data[64];
     int size = 0, code;
     uint64_t begin;
-    printf("usb_hello: UNPLUG NOW\n");
+    printf("host: unplug\n");
     fflush(stdout);
     do
         code = libusb_bulk_transfer(board, LUMI_WIRE_USB_IN, data, sizeof data, &size, 10000);

@@ -15,8 +15,8 @@ mkdir -p "$root/src"
 mount --rbind "$source" "$root/src"
 mount -t proc proc "$root/proc" 2>/dev/null || mount --rbind /proc "$root/proc"
 mount --rbind /dev "$root/dev"
-exec chroot "$root" sh -ec '
-export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root
+exec env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin chroot "$root" sh -ec '
+export HOME=/root
 cd /src
 cmake -G Ninja -S . -B build/debian13 -DCMAKE_BUILD_TYPE=Release >build/debian13.log
 ninja -C build/debian13 lumi_hardware >>build/debian13.log'
