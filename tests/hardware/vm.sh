@@ -5,7 +5,8 @@
 #
 # vm_NAME.host.sh, where there is one, is sourced first, on this machine: it may start programs (their process numbers into
 # $helpers) and add to $qemu, the machine's arguments. $work is a folder of its own; the machine sees it as /out.
-# host_asked WORD... is called there when the machine writes a line "host: WORD..." on its console.
+# host_asked WORD... is called there when the machine writes a line "host: WORD..." on its console; host_again STATUS when
+# the machine has ended (STATUS empty: without a word, as after a power cut: kill -9 $machine); 0 starts it again.
 set -eu
 cache=$1 script=$2
 shift 2
@@ -33,47 +34,67 @@ trap finish EXIT
 host_asked() {
     echo "nobody here does '$*'"
 }
+host_again() {
+    return 1
+}
 qemu=
 name=${script%.sh}
 if [ -e "$here/$name.host.sh" ]; then
     . "$here/$name.host.sh"
 fi
-: >"$work/console"
+
 # TCG: KVM is not to be had everywhere, and hangs where it is nested badly.
-# shellcheck disable=SC2086
-nice qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m 2048 -nographic -no-reboot -nodefaults -serial stdio \
-    -kernel "$cache/kernel" -initrd "$cache/initrd" \
-    -append "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off no_timer_check net.ifnames=0 lumi.script=$script $*" \
-    -fsdev "local,id=root,path=$cache/root,security_model=none,readonly=on,multidevs=remap" \
-    -device virtio-9p-pci,fsdev=root,mount_tag=root \
-    -fsdev "local,id=source,path=$source,security_model=none,readonly=on,multidevs=remap" \
-    -device virtio-9p-pci,fsdev=source,mount_tag=source \
-    -fsdev "local,id=out,path=$work,security_model=none" -device virtio-9p-pci,fsdev=out,mount_tag=out \
-    $qemu </dev/null >"$work/console" 2>&1 &
-machine=$!
-lines=0 waited=0
-while :; do
-    alive=yes
-    kill -0 "$machine" 2>/dev/null || alive=
+boot() {
+    rm -f "$work/status"
+    : >"$work/console"
+    # shellcheck disable=SC2086
+    nice qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m 2048 -nographic -no-reboot -nodefaults \
+        -serial stdio -kernel "$cache/kernel" -initrd "$cache/initrd" \
+        -append "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off no_timer_check net.ifnames=0 lumi.script=$script $words" \
+        -fsdev "local,id=root,path=$cache/root,security_model=none,readonly=on,multidevs=remap" \
+        -device virtio-9p-pci,fsdev=root,mount_tag=root \
+        -fsdev "local,id=source,path=$source,security_model=none,readonly=on,multidevs=remap" \
+        -device virtio-9p-pci,fsdev=source,mount_tag=source \
+        -fsdev "local,id=out,path=$work,security_model=none" -device virtio-9p-pci,fsdev=out,mount_tag=out \
+        $qemu </dev/null >"$work/console" 2>&1 &
+    machine=$!
+}
+
+# The console's new lines, shown, and what they ask for.
+listen() {
     now=$(wc -l <"$work/console")
-    if [ "$now" -gt "$lines" ]; then
-        sed -n "$((lines + 1)),${now}p" "$work/console" | tr -d '\r' >"$work/new"
-        lines=$now
-        cat "$work/new"
-        while read -r first rest; do
-            # shellcheck disable=SC2086
-            [ "$first" != host: ] || host_asked $rest
-        done <"$work/new"
-    fi
-    [ -n "$alive" ] || break
-    sleep 0.2
-    waited=$((waited + 1))
-    if [ $waited -gt $((5 * ${LUMI_VM_SECONDS:-900})) ]; then
-        echo "the machine has not ended after ${LUMI_VM_SECONDS:-900} s"
-        exit 1
-    fi
+    [ "$now" -gt "$lines" ] || return 0
+    sed -n "$((lines + 1)),${now}p" "$work/console" | tr -d '\r' >"$work/new"
+    lines=$now
+    cat "$work/new"
+    while read -r first rest; do
+        # shellcheck disable=SC2086
+        [ "$first" != host: ] || host_asked $rest
+    done <"$work/new"
+}
+
+# Until it ends, or its time is over.
+watch() {
+    lines=0 waited=0
+    while kill -0 "$machine" 2>/dev/null; do
+        listen
+        sleep 0.2
+        waited=$((waited + 1))
+        if [ $waited -gt $((5 * ${LUMI_VM_SECONDS:-900})) ]; then
+            echo "the machine has not ended after ${LUMI_VM_SECONDS:-900} s"
+            exit 1
+        fi
+    done
+    listen
+    machine=
+}
+
+words="$*"
+while :; do
+    boot
+    watch
+    status=$(cat "$work/status" 2>/dev/null || true)
+    host_again "$status" || break
 done
-machine=
-tail -n +$((lines + 1)) "$work/console"
-[ -e "$work/status" ] || { echo "the machine ended without a word"; exit 1; }
-exit "$(cat "$work/status")"
+[ -n "$status" ] || { echo "the machine ended without a word"; exit 1; }
+exit "$status"
