@@ -20,7 +20,7 @@ struct lumi_gpio_line {
     char line_name[64];
     char camera[LUMI_GPIO_NAME]; /* SYNC, POWER: whose; "" all */
     bool active_low;
-    int debounce_us; /* in the kernel where it can, ESTOP only; 0 none */
+    int debounce_us; /* ESTOP, by the kernel: libgpiod 2 only; 0 none */
 };
 
 struct lumi_gpio_edge {
@@ -37,7 +37,7 @@ struct lumi_gpio_options {
     void *context;
 };
 /* Asks for the lines. LUMI_ERR_NOTFOUND (no such chip or line), LUMI_ERR_BUSY (somebody's), each naming the line. An
- * e-stop that is pressed already is reported at once. */
+ * e-stop that is pressed already is reported at once; one whose chip goes away counts as pressed. */
 int lumi_gpio_open(const struct lumi_gpio_line *lines, int count, const struct lumi_gpio_options *options,
                    struct lumi_gpio **gpio, struct lumi_error *error);
 void lumi_gpio_close(struct lumi_gpio *gpio);                             /* outputs go inactive; NULL is fine */
