@@ -12,6 +12,7 @@
 #include "proto/base/result.h"
 
 #include <poll.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -60,13 +61,22 @@ struct lumi_camera_frame {
     double temperature;      /* °C; NaN: unknown */
     uint64_t trigger;        /* the device's own trigger count, where it has one (chunk data) */
     uint32_t packets_resent, packets_missing;         /* of this frame, GigE Vision */
-    void (*release)(struct lumi_camera_frame *frame); /* from any thread, once */
+    void (*release)(struct lumi_camera_frame *frame); /* the backend's: gives it back to its pool; from any thread */
     void *owner;
+    atomic_uint others; /* holders beside the first: 0 as it comes */
 };
+/* One more holder; each of them releases it once, from any thread. */
+static inline struct lumi_camera_frame *lumi_camera_frame_ref(struct lumi_camera_frame *frame)
+{
+    atomic_fetch_add_explicit(&frame->others, 1, memory_order_relaxed);
+    return frame;
+}
 static inline void lumi_camera_frame_release(struct lumi_camera_frame *frame)
 {
-    if (frame)
+    if (frame && atomic_fetch_sub_explicit(&frame->others, 1, memory_order_acq_rel) == 0) {
+        atomic_store_explicit(&frame->others, 0, memory_order_relaxed);
         frame->release(frame);
+    }
 }
 
 /* ---- the camera ---- */
@@ -121,8 +131,8 @@ struct lumi_camera_status {
 
 struct lumi_camera;
 struct lumi_camera_ops {
-    /* Sets it up for frames, not yet armed. LUMI_ERR_UNSUPPORTED: it cannot, with what it could. May be called again.
-     */
+    /* Sets it up for frames, not yet armed. LUMI_ERR_UNSUPPORTED: it cannot, with what it could. May be called again;
+     * it disarms. */
     int (*configure)(struct lumi_camera *camera, const struct lumi_camera_setting *setting, struct lumi_error *error);
     int (*arm)(struct lumi_camera *camera, struct lumi_error *error); /* from now on frames come */
     int (*disarm)(struct lumi_camera *camera, struct lumi_error *error);
@@ -130,10 +140,12 @@ struct lumi_camera_ops {
     int (*trigger)(struct lumi_camera *camera, struct lumi_error *error);
     /* A new exposure time and gain while armed, from the next frame on that says so (brackets). May be NULL. */
     int (*expose)(struct lumi_camera *camera, double exposure_s, double gain, struct lumi_error *error);
+    /* LUMI_ERR_IO: the camera is gone. */
     int (*status)(struct lumi_camera *camera, struct lumi_camera_status *status, struct lumi_error *error);
     /* What to wait for: at most `max` descriptors; returns their number. 0: ask `frame` every few milliseconds. */
     int (*poll_fds)(struct lumi_camera *camera, struct pollfd *fds, int max);
-    /* The next frame, the caller's to release; NULL: none now. LUMI_ERR_IO: the camera is gone (close it). */
+    /* The next frame, the caller's to release; NULL: none now. LUMI_ERR_IO: the camera is gone (close it); another
+     * code: it goes on, the error is told. */
     int (*frame)(struct lumi_camera *camera, struct lumi_camera_frame **frame, struct lumi_error *error);
     void (*close)(struct lumi_camera *camera); /* disarms; frames that are out stay valid */
 };
@@ -145,10 +157,12 @@ struct lumi_camera {
 /* The cameras that are there now, of all backends but FILES, or of one. Returns how many (at most `max` filled in) or a
  * negative code. Two with one serial number are both listed; lumi_camera_open refuses them. */
 int lumi_camera_list(struct lumi_camera_identity *cameras, int max, struct lumi_error *error);
-/* Address: "v4l2:SERIAL", "libcamera:SERIAL", "aravis:SERIAL", or the serial alone, or "files:/folder" (what follows is
- * the serial's stand-in: the folder). A place instead of a serial ("v4l2:/dev/video0", "aravis:192.168.1.7") is for
- * benches. LUMI_ERR_NOTFOUND: not there (now); LUMI_ERR_BUSY: another program has it; LUMI_ERR_EXISTS: two have this
- * serial. */
+/* Address: "v4l2:SERIAL", "libcamera:SERIAL", "aravis:SERIAL", or the serial alone (the first backend that has it, in
+ * this order: a USB camera is seen by two), or "files:/folder" (what follows is the serial's stand-in: the folder). A
+ * place instead of a serial ("v4l2:/dev/video0", "aravis:192.168.1.7") is for benches. LUMI_ERR_ARG: malformed, or of a
+ * backend that is not built in (LUMI_ERR_UNSUPPORTED); LUMI_ERR_NOTFOUND: not there (now); LUMI_ERR_BUSY: another
+ * program has it; LUMI_ERR_EXISTS: two have this serial. */
+int lumi_camera_address_check(const char *address, struct lumi_error *error); /* without looking for the camera */
 int lumi_camera_open(const char *address, struct lumi_camera **camera, struct lumi_error *error);
 void lumi_camera_close(struct lumi_camera *camera); /* NULL is fine */
 
