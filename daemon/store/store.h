@@ -20,10 +20,11 @@ struct lumi_store;
 
 enum lumi_store_job_kind {
     LUMI_STORE_PLAN = 0, /* rows of positions, shots and frames for a plan: see lumi_store_plan */
-    LUMI_STORE_SHOT,     /* a shot was fired, or lost: rows of its frames triggered */
+    LUMI_STORE_SHOT,     /* a shot was fired: rows of its frames triggered; those that are already are left alone */
     LUMI_STORE_EXPOSED,  /* a sync edge */
     LUMI_STORE_FRAME,    /* bytes of a frame */
-    LUMI_STORE_LOST,     /* a frame that will never come */
+    LUMI_STORE_LOST,     /* a frame that will never come: triggered → rejected; a planned one keeps its state; `text`
+                            becomes its reason */
     LUMI_STORE_JUDGED,
     LUMI_STORE_RETAKE,   /* a new planned frame for a rejected one; done.frame is its id */
     LUMI_STORE_INCIDENT, /* one line for the capture's log: dropped, doubled, late, camera gone … */
@@ -38,8 +39,8 @@ struct lumi_store_job {
     uint64_t id;   /* the giver's; comes back */
     int64_t frame; /* row; FRAME, EXPOSED, LOST, JUDGED, RETAKE */
     /* SHOT */
-    int64_t shot;                         /* row */
-    int64_t trigger_us[LUMI_RIG_CAMERAS]; /* by camera of the rig; LUMI_NO_TIME: not fired */
+    int64_t frames[LUMI_RIG_CAMERAS];     /* row of each camera's frame (a retake's is of another shot), 0: none */
+    int64_t trigger_us[LUMI_RIG_CAMERAS]; /* of it; LUMI_NO_TIME: when is not known */
     /* EXPOSED */
     int64_t exposed_us;
     /* FRAME: the file is these pieces one after another, or the file at `path`. They stay valid until the job is done.

@@ -176,6 +176,7 @@ int lumi_capture_set_pose(struct lumi_capture *capture, int64_t frame, const str
 /* A frame joined with all that belongs to it. */
 struct lumi_capture_frame {
     int64_t id, camera, lens_id, position_id, shot_id;
+    int64_t retake_of; /* the frame it replaces, 0: none */
     char name[LUMI_CAPTURE_NAME];
     char original[256];
     char camera_name[LUMI_CAPTURE_NAME];

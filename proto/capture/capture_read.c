@@ -23,7 +23,7 @@ static int interrupt(void *context)
     "l.width, l.height, l.model, l.fx, l.fy, l.cx, l.cy, l.k1, l.k2, l.k3, l.k4, l.p1, l.p2, l.source_model, "         \
     "q.source, q.r00, q.r01, q.r02, q.r10, q.r11, q.r12, q.r20, q.r21, q.r22, q.tx, q.ty, q.tz, f.grid_row, "          \
     "f.grid_column, p.number, p.turn, s.number, p.step, p.turn_angle, p.drop_angle, s.exposure_offset, "               \
-    "f.exposure_s, f.iso, f.sharpness, f.trigger_time_us, f.camera_time_us "
+    "f.exposure_s, f.iso, f.sharpness, f.trigger_time_us, f.camera_time_us, f.retake_of "
 #define FRAME_TABLES                                                                                                   \
     "FROM frames f JOIN shots s ON s.id = f.shot JOIN positions p ON p.id = s.position JOIN cameras c ON c.id = "      \
     "f.camera JOIN lenses l ON l.id = f.lens LEFT JOIN poses q ON q.frame = f.id AND q.current = 1 "
@@ -141,6 +141,7 @@ static int read_frame(struct lumi_capture *capture, sqlite3_stmt *row, struct lu
     frame->sharpness = sqlite3_column_double(row, 50);
     frame->trigger_time_us = time_of(row, 51);
     frame->camera_time_us = time_of(row, 52);
+    frame->retake_of = sqlite3_column_int64(row, 53);
     if (state >= 0)
         frame->state = (enum lumi_frame_state)state;
 
