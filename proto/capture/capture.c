@@ -399,6 +399,20 @@ int lumi_capture_commit(struct lumi_capture *capture, struct lumi_error *error)
     return LUMI_OK;
 }
 
+void lumi_capture_rollback(struct lumi_capture *capture)
+{
+    if (!capture->in_batch)
+        return;
+    sqlite3_exec(capture->db, "ROLLBACK", NULL, NULL, NULL);
+    capture_drop_pending(capture, true);
+    capture->in_batch = false;
+}
+
+bool lumi_capture_in_batch(const struct lumi_capture *capture)
+{
+    return capture->in_batch && !sqlite3_get_autocommit(capture->db);
+}
+
 int lumi_capture_publish(struct lumi_capture *capture, const char *date, struct lumi_error *error)
 {
     if (!capture->final_path)
@@ -426,10 +440,7 @@ void lumi_capture_close(struct lumi_capture *capture)
 {
     if (!capture)
         return;
-    if (capture->in_batch) {
-        sqlite3_exec(capture->db, "ROLLBACK", NULL, NULL, NULL);
-        capture_drop_pending(capture, true);
-    }
+    lumi_capture_rollback(capture);
     if (capture->final_path) {
         sqlite3_close(capture->db);
         capture->db = NULL;

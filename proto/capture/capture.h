@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LUMI_CAPTURE_VERSION 1
+#define LUMI_CAPTURE_VERSION 2
 #define LUMI_CAPTURE_NAME 64       /* frame and camera names, with their end; safe as file names */
 #define LUMI_CAPTURE_PATH 160      /* relative paths, with their end */
 #define LUMI_CAPTURE_PARAMETERS 16 /* of a source's lens model, at most */
@@ -59,6 +59,11 @@ void lumi_capture_close(struct lumi_capture *capture);
 /* Between these, rows are committed and files synced once, at the commit, instead of one by one. Not nested. */
 int lumi_capture_begin(struct lumi_capture *capture, struct lumi_error *error);
 int lumi_capture_commit(struct lumi_capture *capture, struct lumi_error *error);
+/* What was begun is undone, rows and files. A batch whose commit failed is still there until this. */
+void lumi_capture_rollback(struct lumi_capture *capture);
+/* Whether a batch has begun and is still whole: after some failures (disk full) SQLite has undone all of it by itself;
+ * then only lumi_capture_rollback may follow. */
+bool lumi_capture_in_batch(const struct lumi_capture *capture);
 
 bool lumi_capture_sealed(const struct lumi_capture *capture);
 /* The directory as it was opened (the .partial one while it is that); owned by the capture. */
@@ -106,6 +111,22 @@ int lumi_capture_add_position(struct lumi_capture *capture, const struct lumi_ca
 /* `number` counts the shots of a position from 0; exposure_offset in stops against the plan's exposure. */
 int lumi_capture_add_shot(struct lumi_capture *capture, int64_t position, int number, double exposure_offset,
                           int64_t *id, struct lumi_error *error);
+/* Which shot of the plan it is (lumi_plan_shots), and the sweep in which it was fired; −1: none. */
+int lumi_capture_set_shot(struct lumi_capture *capture, int64_t shot, int plan_shot, int sweep,
+                          struct lumi_error *error);
+
+/* The device that took the frames of a camera of the capture. */
+struct lumi_capture_device {
+    char vendor[64], model[64], serial[64], firmware[64], address[256];
+};
+int lumi_capture_set_device(struct lumi_capture *capture, int64_t camera, const struct lumi_capture_device *device,
+                            struct lumi_error *error);
+/* All empty where none is known. */
+int lumi_capture_get_device(struct lumi_capture *capture, int64_t camera, struct lumi_capture_device *device,
+                            struct lumi_error *error);
+/* The camera that was added as number `index`, from 0. LUMI_ERR_NOTFOUND. */
+int lumi_capture_camera(struct lumi_capture *capture, int index, int64_t *id, char name[LUMI_CAPTURE_NAME],
+                        struct lumi_error *error);
 
 /* ---- Frames ---- */
 
@@ -140,9 +161,16 @@ struct lumi_capture_new_frame {
 int lumi_capture_add_frame(struct lumi_capture *capture, const struct lumi_capture_new_frame *frame, int64_t *id,
                            struct lumi_error *error);
 
-/* planned → triggered. Microseconds of the rig's clock, or LUMI_NO_TIME. */
+/* planned → triggered. Microseconds of the rig's clock, or LUMI_NO_TIME. Of a frame that has gone further only the time
+ * is kept. */
 int lumi_capture_trigger_frame(struct lumi_capture *capture, int64_t frame, int64_t trigger_time_us,
                                struct lumi_error *error);
+
+/* The middle of the exposure as an edge of its sync line told it, in the clock of the trigger; whatever the state. */
+int lumi_capture_expose_frame(struct lumi_capture *capture, int64_t frame, int64_t exposed_time_us,
+                              struct lumi_error *error);
+/* planned or triggered → rejected: it will not come, and why. Should its file come all the same, it can be stored. */
+int lumi_capture_lose_frame(struct lumi_capture *capture, int64_t frame, const char *reason, struct lumi_error *error);
 
 /* What is known of a stored file; zero (LUMI_NO_TIME) where it is not. */
 struct lumi_capture_file {
@@ -155,17 +183,36 @@ struct lumi_capture_file {
     size_t exif_size;
     const char *label; /* what error texts call the source file; NULL: the frame's name */
 };
-/* planned or triggered → received: copies the file in under data/frames/<name><extension>, with its checksum. */
+/* planned, triggered or lost → received: copies the file in under data/frames/<name><extension>, with its checksum. */
 int lumi_capture_store_file(struct lumi_capture *capture, int64_t frame, const char *source_path,
                             const struct lumi_capture_file *file, struct lumi_error *error);
 int lumi_capture_store_bytes(struct lumi_capture *capture, int64_t frame, const void *data, size_t size,
                              const struct lumi_capture_file *file, struct lumi_error *error);
 
+/* For a writer that brings the bytes to the disk by itself, in threads of its own: the folder of the frames' files as a
+ * descriptor (the capture's), in which it makes files called ".<anything>.tmp", synced; in a batch this then gives such
+ * a file its name and its row. On failure the temporary file is still there. */
+struct lumi_capture_written {
+    const char *temporary;
+    int64_t bytes;
+    const char *sha256; /* 64 hexadecimal digits */
+};
+int lumi_capture_frames_folder(const struct lumi_capture *capture);
+int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, const struct lumi_capture_written *written,
+                            const struct lumi_capture_file *file, struct lumi_error *error);
+
 /* received → accepted or rejected, accepted ↔ rejected, triggered → rejected (lost). `sharpness` and `reason` (NULL:
  * none) are kept. LUMI_ERR_ARG for any other transition. */
 int lumi_capture_judge_frame(struct lumi_capture *capture, int64_t frame, bool accepted, double sharpness,
                              const char *reason, struct lumi_error *error);
-/* rejected → retaken; a new planned frame of the same camera, position and place, named "<name>.<n>", takes over. */
+/* What was measured when it was judged; NaN: not measured. The latest is kept. */
+struct lumi_capture_judgement {
+    double blur_pixels, clipped, dark, mean, exposure_stops, shift_pixels, moved;
+};
+int lumi_capture_set_judgement(struct lumi_capture *capture, int64_t frame,
+                               const struct lumi_capture_judgement *judgement, struct lumi_error *error);
+/* rejected → retaken; a new planned frame of the same camera, position and place, named "<name>.<n>", takes over. It
+ * joins the other retakes of its shot in a new shot that has not been fired yet. */
 int lumi_capture_retake_frame(struct lumi_capture *capture, int64_t frame, int64_t *id, struct lumi_error *error);
 
 /* A pose becomes the frame's current one; earlier ones are kept. `origin`: where it came from ("lumi sim shoot room
@@ -195,7 +242,10 @@ struct lumi_capture_frame {
     int64_t step;
     double turn_angle, drop;
     double exposure_offset, exposure_s, iso, sharpness;
-    int64_t trigger_time_us, camera_time_us;
+    int64_t trigger_time_us, camera_time_us, exposed_time_us;
+    int plan_shot, sweep; /* −1: none */
+    char reason[256];     /* why it was judged so, or lost */
+    struct lumi_capture_judgement judgement;
 };
 
 enum lumi_frame_filter {
@@ -222,6 +272,47 @@ struct lumi_capture_info {
     int64_t frame_bytes, database_bytes;
 };
 int lumi_capture_info(struct lumi_capture *capture, struct lumi_capture_info *info, struct lumi_error *error);
+
+/* ---- What happened ---- */
+
+/* One run over all positions or a part of them. */
+struct lumi_capture_sweep {
+    int number;
+    int64_t began_us, ended_us; /* Unix; LUMI_NO_TIME */
+    char outcome[512];          /* "" while it runs */
+};
+/* A new one, or the same number again. */
+int lumi_capture_set_sweep(struct lumi_capture *capture, const struct lumi_capture_sweep *sweep,
+                           struct lumi_error *error);
+/* A camera's clock fitted against the rig's, over the frames of a sweep. */
+struct lumi_capture_clock {
+    int frames;
+    double offset_s, drift_ppm, residual_s, worst_s;
+};
+int lumi_capture_set_clock(struct lumi_capture *capture, int sweep, int64_t camera,
+                           const struct lumi_capture_clock *clock, struct lumi_error *error);
+/* LUMI_ERR_NOTFOUND: none. */
+int lumi_capture_get_clock(struct lumi_capture *capture, int sweep, int64_t camera, struct lumi_capture_clock *clock,
+                           struct lumi_error *error);
+
+/* A line for the log: dropped, doubled, late, camera gone … */
+struct lumi_capture_incident {
+    int64_t id;      /* when reading */
+    int64_t time_us; /* Unix; LUMI_NO_TIME */
+    char kind[64];
+    int64_t camera, frame; /* 0: none */
+    char text[512];
+};
+int lumi_capture_add_incident(struct lumi_capture *capture, const struct lumi_capture_incident *incident,
+                              struct lumi_error *error);
+/* In the order they were added, sweeps by number. One allocation; release with lumi_free. */
+int lumi_capture_incidents(struct lumi_capture *capture, struct lumi_capture_incident **incidents, int *count,
+                           struct lumi_error *error);
+int lumi_capture_sweeps(struct lumi_capture *capture, struct lumi_capture_sweep **sweeps, int *count,
+                        struct lumi_error *error);
+/* The frames of a shot: their ids by the number of their camera (lumi_capture_camera), 0 where it has none. */
+int lumi_capture_shot_frames(struct lumi_capture *capture, int64_t shot, int64_t *frames, int cameras,
+                             struct lumi_error *error);
 
 /* ---- Verifying ---- */
 

@@ -98,11 +98,11 @@ int capture_write_file(struct lumi_capture *capture, const char *name, const voi
 
 /* ---- Files not yet synced ---- */
 
-static int add_pending(struct lumi_capture *capture, const char *name, struct lumi_error *error)
+static int add_pending(struct lumi_capture *capture, const char *name, bool synced, struct lumi_error *error)
 {
     if (capture->pending_count == capture->pending_capacity) {
         int capacity = capture->pending_capacity ? capture->pending_capacity * 2 : 64;
-        char **more = lumi_realloc(capture->pending, (size_t)capacity, sizeof *more);
+        struct capture_pending *more = lumi_realloc(capture->pending, (size_t)capacity, sizeof *more);
         if (!more)
             return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", capture->path);
         capture->pending = more;
@@ -112,7 +112,7 @@ static int add_pending(struct lumi_capture *capture, const char *name, struct lu
     if (!copy)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", capture->path);
     memcpy(copy, name, strlen(name) + 1);
-    capture->pending[capture->pending_count++] = copy;
+    capture->pending[capture->pending_count++] = (struct capture_pending){copy, synced};
     return LUMI_OK;
 }
 
@@ -120,12 +120,18 @@ void capture_drop_pending(struct lumi_capture *capture, bool remove)
 {
     for (int i = 0; i < capture->pending_count; i++) {
         if (remove)
-            unlinkat(capture->frames_fd, capture->pending[i], 0);
-        lumi_free(capture->pending[i]);
+            unlinkat(capture->frames_fd, capture->pending[i].name, 0);
+        lumi_free(capture->pending[i].name);
     }
     lumi_free(capture->pending);
     capture->pending = NULL;
     capture->pending_count = capture->pending_capacity = 0;
+}
+
+/* The latest, which is not stored after all. */
+static void forget_pending(struct lumi_capture *capture)
+{
+    lumi_free(capture->pending[--capture->pending_count].name);
 }
 
 int capture_sync_pending(struct lumi_capture *capture, struct lumi_error *error)
@@ -133,10 +139,12 @@ int capture_sync_pending(struct lumi_capture *capture, struct lumi_error *error)
     if (capture->pending_count == 0)
         return LUMI_OK;
     for (int i = 0; i < capture->pending_count; i++) {
-        int fd = openat(capture->frames_fd, capture->pending[i], O_RDONLY | O_CLOEXEC);
+        if (capture->pending[i].synced)
+            continue;
+        int fd = openat(capture->frames_fd, capture->pending[i].name, O_RDONLY | O_CLOEXEC);
         int failed = fd < 0 || fsync(fd) < 0;
         if (failed)
-            lumi_fail_errno(error, capture->pending[i], "sync");
+            lumi_fail_errno(error, capture->pending[i].name, "sync");
         if (fd >= 0)
             close(fd);
         if (failed)
@@ -230,7 +238,7 @@ static int place_file(struct lumi_capture *capture, const char *name, const stru
     if (close(fd) < 0 && code == LUMI_OK)
         code = lumi_fail_errno(error, shown, "close");
     if (code == LUMI_OK && later)
-        code = add_pending(capture, name, error);
+        code = add_pending(capture, name, false, error);
     if (code == LUMI_OK && renameat(capture->frames_fd, temporary, capture->frames_fd, name) < 0)
         code = lumi_fail_errno(error, shown, "rename");
     if (code == LUMI_OK && !later && fsync(capture->frames_fd) < 0)
@@ -244,6 +252,7 @@ static int place_file(struct lumi_capture *capture, const char *name, const stru
 struct planned {
     char name[LUMI_CAPTURE_NAME], state[16];
     int width, height;
+    bool has_file;
 };
 
 static int find_planned(struct lumi_capture *capture, int64_t frame, struct planned *planned, struct lumi_error *error)
@@ -252,10 +261,11 @@ static int find_planned(struct lumi_capture *capture, int64_t frame, struct plan
     bool row;
     int code;
 
-    LUMI_TRY(capture_db_prepare(capture, &statement, error,
-                                "SELECT f.name, f.state, l.width, l.height FROM frames f JOIN lenses l ON l.id = "
-                                "f.lens WHERE f.id = ?",
-                                "i", frame));
+    LUMI_TRY(capture_db_prepare(
+        capture, &statement, error,
+        "SELECT f.name, f.state, l.width, l.height, f.file IS NOT NULL FROM frames f JOIN lenses l ON l.id = "
+        "f.lens WHERE f.id = ?",
+        "i", frame));
     LUMI_GOTO(code, done, capture_db_step(capture, statement, &row, error));
     if (!row) {
         code = lumi_fail(error, LUMI_ERR_ARG, "%s: no frame %lld", capture->path, (long long)frame);
@@ -265,6 +275,7 @@ static int find_planned(struct lumi_capture *capture, int64_t frame, struct plan
     capture_db_text(statement, 1, planned->state, sizeof planned->state);
     planned->width = sqlite3_column_int(statement, 2);
     planned->height = sqlite3_column_int(statement, 3);
+    planned->has_file = sqlite3_column_int(statement, 4) != 0;
 done:
     sqlite3_finalize(statement);
     return code;
@@ -286,7 +297,8 @@ static int check_store(struct lumi_capture *capture, const struct planned *plann
     if (!file->extension || !extension_ok(file->extension))
         return lumi_fail(error, LUMI_ERR_ARG, "%s: '%s' is no extension for a frame", label,
                          file->extension ? file->extension : "");
-    if (strcmp(planned->state, "planned") != 0 && strcmp(planned->state, "triggered") != 0)
+    if (strcmp(planned->state, "planned") != 0 && strcmp(planned->state, "triggered") != 0 &&
+        (strcmp(planned->state, "rejected") != 0 || planned->has_file))
         return lumi_fail(error, LUMI_ERR_ARG, "%s: frame '%s' is %s already", capture->path, planned->name,
                          planned->state);
     if (file->width != planned->width || file->height != planned->height)
@@ -302,12 +314,12 @@ static int record(struct lumi_capture *capture, int64_t frame, const char *name,
 
     snprintf(path, sizeof path, CAPTURE_FRAMES "/%s", name);
     LUMI_TRY(capture_db_enter(capture, error));
-    int code =
-        capture_db_run(capture, error,
-                       "UPDATE frames SET state = 'received', file = ?, bytes = ?, sha256 = ?, width = ?, "
-                       "height = ?, exposure_s = ?, iso = ?, camera_time_us = nullif(?, ?) WHERE id = ?",
-                       "titiiddiii", path, stored->bytes, stored->sha256, (int64_t)file->width, (int64_t)file->height,
-                       file->exposure_s, file->iso, file->camera_time_us, LUMI_NO_TIME, frame);
+    int code = capture_db_run(
+        capture, error,
+        "UPDATE frames SET state = 'received', reason = NULL, file = ?, bytes = ?, sha256 = ?, width = ?, "
+        "height = ?, exposure_s = ?, iso = ?, camera_time_us = nullif(?, ?) WHERE id = ?",
+        "titiiddiii", path, stored->bytes, stored->sha256, (int64_t)file->width, (int64_t)file->height,
+        file->exposure_s, file->iso, file->camera_time_us, LUMI_NO_TIME, frame);
     if (code == LUMI_OK && file->exif && file->exif_size)
         code = capture_db_run(capture, error, "INSERT INTO exif(frame, data) VALUES(?, ?)", "ib", frame, file->exif,
                               file->exif_size);
@@ -330,7 +342,7 @@ static int store(struct lumi_capture *capture, int64_t frame, const struct conte
     if (code != LUMI_OK) {
         unlinkat(capture->frames_fd, name, 0);
         if (capture->in_batch || capture->final_path)
-            lumi_free(capture->pending[--capture->pending_count]);
+            forget_pending(capture);
     }
     return code;
 }
@@ -349,6 +361,41 @@ int lumi_capture_store_bytes(struct lumi_capture *capture, int64_t frame, const 
     const struct content content = {NULL, data, size};
 
     return store(capture, frame, &content, file, error);
+}
+
+int lumi_capture_frames_folder(const struct lumi_capture *capture)
+{
+    return capture->frames_fd;
+}
+
+int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, const struct lumi_capture_written *written,
+                            const struct lumi_capture_file *file, struct lumi_error *error)
+{
+    char name[LUMI_CAPTURE_NAME + 12];
+    struct stored stored = {.bytes = written->bytes};
+    struct planned planned;
+
+    LUMI_TRY(capture_need_writable(capture, error));
+    if (!capture->in_batch)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s: no batch has begun", capture->path);
+    LUMI_TRY(find_planned(capture, frame, &planned, error));
+    LUMI_TRY(check_store(capture, &planned, file, error));
+    snprintf(name, sizeof name, "%s%s", planned.name, file->extension);
+    snprintf(stored.sha256, sizeof stored.sha256, "%s", written->sha256);
+    LUMI_TRY(add_pending(capture, name, true, error));
+    int code = LUMI_OK;
+    if (renameat(capture->frames_fd, written->temporary, capture->frames_fd, name) < 0)
+        code = lumi_fail_errno(error, name, "rename");
+    if (code != LUMI_OK) {
+        forget_pending(capture);
+        return code;
+    }
+    code = record(capture, frame, name, &stored, file, error);
+    if (code != LUMI_OK) {
+        renameat(capture->frames_fd, name, capture->frames_fd, written->temporary);
+        forget_pending(capture);
+    }
+    return code;
 }
 
 /* ---- After a crash ---- */

@@ -12,6 +12,11 @@
 #define CAPTURE_FRAMES "data/frames"
 #define CAPTURE_SEAL "tagmanifest-sha256.txt" /* written last, removed first: its presence means sealed */
 
+struct capture_pending {
+    char *name;  /* in data/frames */
+    bool synced; /* by who wrote it */
+};
+
 struct lumi_capture {
     char *path;       /* directory in use */
     char *final_path; /* where publish puts it; NULL unless staged */
@@ -19,8 +24,8 @@ struct lumi_capture {
     int dir_fd;    /* of the directory, locked by a writer; −1 for a capture in memory */
     int frames_fd; /* of data/frames; writers only */
     bool writable, sealed, in_batch;
-    int64_t db_bytes; /* bounds what a damaged database can make a reader do */
-    char **pending;   /* files stored in this batch and not yet synced, names in data/frames */
+    int64_t db_bytes;                /* bounds what a damaged database can make a reader do */
+    struct capture_pending *pending; /* files stored in this batch */
     int pending_count, pending_capacity;
 };
 

@@ -23,10 +23,13 @@ static int interrupt(void *context)
     "l.width, l.height, l.model, l.fx, l.fy, l.cx, l.cy, l.k1, l.k2, l.k3, l.k4, l.p1, l.p2, l.source_model, "         \
     "q.source, q.r00, q.r01, q.r02, q.r10, q.r11, q.r12, q.r20, q.r21, q.r22, q.tx, q.ty, q.tz, f.grid_row, "          \
     "f.grid_column, p.number, p.turn, s.number, p.step, p.turn_angle, p.drop_angle, s.exposure_offset, "               \
-    "f.exposure_s, f.iso, f.sharpness, f.trigger_time_us, f.camera_time_us, f.retake_of "
+    "f.exposure_s, f.iso, f.sharpness, f.trigger_time_us, f.camera_time_us, f.exposed_time_us, "                       \
+    "ifnull(s.plan_shot, -1), ifnull(s.sweep, -1), f.retake_of, f.reason, j.blur_pixels, j.clipped, j.dark, j.mean, "  \
+    "j.exposure_stops, j.shift_pixels, j.moved "
 #define FRAME_TABLES                                                                                                   \
     "FROM frames f JOIN shots s ON s.id = f.shot JOIN positions p ON p.id = s.position JOIN cameras c ON c.id = "      \
-    "f.camera JOIN lenses l ON l.id = f.lens LEFT JOIN poses q ON q.frame = f.id AND q.current = 1 "
+    "f.camera JOIN lenses l ON l.id = f.lens LEFT JOIN poses q ON q.frame = f.id AND q.current = 1 "                   \
+    "LEFT JOIN judgements j ON j.frame = f.id "
 #define FRAME_ORDER "ORDER BY p.number, s.number, f.camera, f.id"
 
 static int read_lens(sqlite3_stmt *row, int column, struct lumi_lens *lens)
@@ -106,6 +109,27 @@ static int read_pose(sqlite3_stmt *row, int column, struct lumi_capture_frame *f
     return lumi_pose_valid(&frame->pose, 1e-3) ? LUMI_OK : LUMI_ERR_FORMAT;
 }
 
+static double number_or_nan(sqlite3_stmt *row, int column)
+{
+    return sqlite3_column_type(row, column) == SQLITE_NULL ? (double)NAN : sqlite3_column_double(row, column);
+}
+
+/* What became of it. */
+static void read_fate(sqlite3_stmt *row, int column, struct lumi_capture_frame *frame)
+{
+    struct lumi_capture_judgement *judgement = &frame->judgement;
+    double *numbers[] = {&judgement->blur_pixels,    &judgement->clipped,      &judgement->dark, &judgement->mean,
+                         &judgement->exposure_stops, &judgement->shift_pixels, &judgement->moved};
+
+    frame->exposed_time_us = time_of(row, column);
+    frame->plan_shot = sqlite3_column_int(row, column + 1);
+    frame->sweep = sqlite3_column_int(row, column + 2);
+    frame->retake_of = sqlite3_column_int64(row, column + 3);
+    capture_db_text(row, column + 4, frame->reason, sizeof frame->reason);
+    for (int i = 0; i < 7; i++)
+        *numbers[i] = number_or_nan(row, column + 5 + i);
+}
+
 static int read_frame(struct lumi_capture *capture, sqlite3_stmt *row, struct lumi_capture_frame *frame,
                       struct lumi_error *error)
 {
@@ -141,7 +165,7 @@ static int read_frame(struct lumi_capture *capture, sqlite3_stmt *row, struct lu
     frame->sharpness = sqlite3_column_double(row, 50);
     frame->trigger_time_us = time_of(row, 51);
     frame->camera_time_us = time_of(row, 52);
-    frame->retake_of = sqlite3_column_int64(row, 53);
+    read_fate(row, 53, frame);
     if (state >= 0)
         frame->state = (enum lumi_frame_state)state;
 

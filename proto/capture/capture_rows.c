@@ -252,12 +252,38 @@ static int need_state(struct lumi_capture *capture, int64_t frame, unsigned allo
 int lumi_capture_trigger_frame(struct lumi_capture *capture, int64_t frame, int64_t trigger_time_us,
                                struct lumi_error *error)
 {
+    const unsigned any = ~0u;
     char name[LUMI_CAPTURE_NAME];
 
-    LUMI_TRY(need_state(capture, frame, 1u << LUMI_FRAME_PLANNED, LUMI_FRAME_TRIGGERED, name, error));
-    return capture_db_run(capture, error,
-                          "UPDATE frames SET state = 'triggered', trigger_time_us = nullif(?, ?) WHERE id = ?", "iii",
-                          trigger_time_us, LUMI_NO_TIME, frame);
+    LUMI_TRY(need_state(capture, frame, any, LUMI_FRAME_TRIGGERED, name, error));
+    LUMI_TRY(capture_db_enter(capture, error));
+    int code = capture_db_run(capture, error, "UPDATE frames SET trigger_time_us = nullif(?, ?) WHERE id = ?", "iii",
+                              trigger_time_us, LUMI_NO_TIME, frame);
+    if (code == LUMI_OK)
+        code = capture_db_run(capture, error,
+                              "UPDATE frames SET state = 'triggered' WHERE id = ? AND state = 'planned'", "i", frame);
+    return capture_db_leave(capture, code, error);
+}
+
+int lumi_capture_expose_frame(struct lumi_capture *capture, int64_t frame, int64_t exposed_time_us,
+                              struct lumi_error *error)
+{
+    const unsigned any = ~0u;
+    char name[LUMI_CAPTURE_NAME];
+
+    LUMI_TRY(need_state(capture, frame, any, LUMI_FRAME_TRIGGERED, name, error));
+    return capture_db_run(capture, error, "UPDATE frames SET exposed_time_us = nullif(?, ?) WHERE id = ?", "iii",
+                          exposed_time_us, LUMI_NO_TIME, frame);
+}
+
+int lumi_capture_lose_frame(struct lumi_capture *capture, int64_t frame, const char *reason, struct lumi_error *error)
+{
+    char name[LUMI_CAPTURE_NAME];
+
+    LUMI_TRY(need_state(capture, frame, 1u << LUMI_FRAME_PLANNED | 1u << LUMI_FRAME_TRIGGERED, LUMI_FRAME_REJECTED,
+                        name, error));
+    return capture_db_run(capture, error, "UPDATE frames SET state = 'rejected', reason = ? WHERE id = ?", "ti", reason,
+                          frame);
 }
 
 int lumi_capture_judge_frame(struct lumi_capture *capture, int64_t frame, bool accepted, double sharpness,
@@ -301,6 +327,28 @@ static int read_for_retake(struct lumi_capture *capture, int64_t frame, struct l
     return code;
 }
 
+/* The shot that a retake belongs to: one that replaces the same shot and has not been fired, or a new one. */
+static int retake_shot(struct lumi_capture *capture, int64_t frame, int64_t camera, int64_t position,
+                       double exposure_offset, int64_t *shot, struct lumi_error *error)
+{
+    int64_t number;
+
+    LUMI_TRY(capture_db_int(capture, shot, error,
+                            "SELECT ifnull(max(n.shot), 0) FROM frames o JOIN frames p ON p.shot = o.shot JOIN frames "
+                            "n ON n.retake_of = p.id WHERE o.id = ?1 AND NOT EXISTS(SELECT 1 FROM frames x WHERE "
+                            "x.shot = n.shot AND (x.camera = ?2 OR x.state <> 'planned'))",
+                            "ii", frame, camera));
+    if (*shot)
+        return LUMI_OK;
+    LUMI_TRY(
+        capture_db_int(capture, &number, error, "SELECT max(number) + 1 FROM shots WHERE position = ?", "i", position));
+    LUMI_TRY(lumi_capture_add_shot(capture, position, (int)number, exposure_offset, shot, error));
+    return capture_db_run(capture, error,
+                          "UPDATE shots SET plan_shot = (SELECT s.plan_shot FROM shots s JOIN frames f ON f.shot = "
+                          "s.id WHERE f.id = ?) WHERE id = ?",
+                          "ii", frame, *shot);
+}
+
 static int insert_retake(struct lumi_capture *capture, int64_t frame, const char *old_name, int64_t *id,
                          struct lumi_error *error)
 {
@@ -319,10 +367,7 @@ static int insert_retake(struct lumi_capture *capture, int64_t frame, const char
     if (!capture_name_ok(name, LUMI_CAPTURE_NAME))
         return lumi_fail(error, LUMI_ERR_LIMIT, "%s: the name of a retake of '%s' is too long", capture->path,
                          old_name);
-    int64_t number;
-    LUMI_TRY(
-        capture_db_int(capture, &number, error, "SELECT max(number) + 1 FROM shots WHERE position = ?", "i", position));
-    LUMI_TRY(lumi_capture_add_shot(capture, position, (int)number, exposure_offset, &shot, error));
+    LUMI_TRY(retake_shot(capture, frame, again.camera, position, exposure_offset, &shot, error));
     again.name = name;
     again.shot = shot;
     LUMI_TRY(insert_frame(capture, &again, frame, id, error));

@@ -134,7 +134,7 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
     FAILS(lumi_capture_judge_frame(capture, id, true, 1, NULL, error), LUMI_ERR_ARG, "'f' is planned");
     FAILS(lumi_capture_retake_frame(capture, id, &again, error), LUMI_ERR_ARG, "cannot become retaken");
     OK(lumi_capture_trigger_frame(capture, id, 5, error));
-    FAILS(lumi_capture_trigger_frame(capture, id, 5, error), LUMI_ERR_ARG, "is triggered");
+    OK(lumi_capture_trigger_frame(capture, id, 6, error)); /* told again: the time is kept */
     OK(lumi_capture_store_bytes(capture, id, "x", 1, &file, error));
     FAILS(lumi_capture_store_bytes(capture, id, "y", 1, &file, error), LUMI_ERR_ARG, "received already");
     OK(lumi_capture_judge_frame(capture, id, true, 0.5, NULL, error));
@@ -155,6 +155,8 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
     assert_string_equal(frames[2].name, "f.2.2");
     assert_int_equal(frames[2].shot, 2);
     assert_int_equal(frames[0].state, LUMI_FRAME_RETAKEN);
+    assert_int_equal(frames[0].trigger_time_us, 6);
+    assert_int_equal(frames[2].retake_of, again);
     lumi_free(frames);
     lumi_capture_close(capture);
 }
@@ -363,15 +365,15 @@ static void a_newer_capture_and_a_stranger_are_refused(void **state)
     const char *path = in_scratch(state, "a");
 
     make_sealed(state, "a", 1);
-    assert_int_equal(sql(state, "a", "PRAGMA user_version = 2"), SQLITE_OK);
-    FAILS(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error), LUMI_ERR_VERSION, "version 2");
-    FAILS(lumi_capture_open(path, LUMI_CAPTURE_WRITE, &capture, error), LUMI_ERR_VERSION, "version 2");
+    assert_int_equal(sql(state, "a", "PRAGMA user_version = 3"), SQLITE_OK);
+    FAILS(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error), LUMI_ERR_VERSION, "version 3");
+    FAILS(lumi_capture_open(path, LUMI_CAPTURE_WRITE, &capture, error), LUMI_ERR_VERSION, "version 3");
     assert_int_equal(access(in_scratch(state, "a/tagmanifest-sha256.txt"), F_OK), 0); /* still sealed */
     struct lumi_verify_result result;
-    FAILS(lumi_capture_verify(path, NULL, NULL, NULL, &result, error), LUMI_ERR_VERSION, "version 2");
+    FAILS(lumi_capture_verify(path, NULL, NULL, NULL, &result, error), LUMI_ERR_VERSION, "version 3");
     assert_int_equal(sql(state, "a", "PRAGMA user_version = 0"), SQLITE_OK);
     FAILS(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error), LUMI_ERR_FORMAT, "never was");
-    assert_int_equal(sql(state, "a", "PRAGMA user_version = 1; CREATE VIEW v AS SELECT 1"), SQLITE_OK);
+    assert_int_equal(sql(state, "a", "PRAGMA user_version = 2; CREATE VIEW v AS SELECT 1"), SQLITE_OK);
     FAILS(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error), LUMI_ERR_FORMAT, "view 'v'");
     assert_int_equal(sql(state, "a", "DROP VIEW v; DROP TABLE plan"), SQLITE_OK);
     FAILS(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error), LUMI_ERR_FORMAT, "no table 'plan'");
