@@ -19,16 +19,17 @@
 struct lumi_store;
 
 enum lumi_store_job_kind {
-    LUMI_STORE_PLAN = 0, /* rows of positions, shots and frames for a plan: see lumi_store_plan */
-    LUMI_STORE_SHOT,     /* a shot was fired: rows of its frames triggered; those that are already are left alone */
+    LUMI_STORE_SHOT = 0, /* a shot was fired: rows of its frames triggered; those that are already are left alone */
     LUMI_STORE_EXPOSED,  /* a sync edge */
     LUMI_STORE_FRAME,    /* bytes of a frame */
     LUMI_STORE_LOST,     /* a frame that will never come: triggered → rejected; a planned one keeps its state; `text`
-                            becomes its reason */
+                            becomes its reason. Should it come all the same, it can be given. */
     LUMI_STORE_JUDGED,
     LUMI_STORE_RETAKE,   /* a new planned frame for a rejected one; done.frame is its id */
     LUMI_STORE_INCIDENT, /* one line for the capture's log: dropped, doubled, late, camera gone … */
-    LUMI_STORE_SWEEP,    /* a sweep begins or has ended: clock fits, residuals, how */
+    LUMI_STORE_SWEEP,    /* a sweep begins or has ended, and how */
+    LUMI_STORE_CLOCK,    /* a camera's clock as fitted in a sweep */
+    LUMI_STORE_DEVICE,   /* which device is a camera of the rig */
     LUMI_STORE_META,
     LUMI_STORE_SEAL /* everything is synced, verified against its checksums if asked, and the bag closed */
 };
@@ -43,8 +44,8 @@ struct lumi_store_job {
     int64_t trigger_us[LUMI_RIG_CAMERAS]; /* of it; LUMI_NO_TIME: when is not known */
     /* EXPOSED */
     int64_t exposed_us;
-    /* FRAME: the file is these pieces one after another, or the file at `path`. They stay valid until the job is done.
-     */
+    /* FRAME: the file is these pieces one after another, or the file at `path`. They, and what `file` points to, stay
+     * valid until the job is done. */
     struct iovec pieces[LUMI_STORE_IOV];
     int piece_count;
     const char *path;
@@ -56,15 +57,18 @@ struct lumi_store_job {
     struct lumi_capture_file file;
     /* JUDGED */
     bool accepted;
-    double sharpness, blur_pixels, clipped, exposure_stops, shift_pixels, moved;
+    double sharpness;
+    struct lumi_capture_judgement judgement; /* NaN: not measured */
     /* JUDGED, LOST, INCIDENT, RETAKE, SWEEP: why; META: the value */
     char text[512];
     char key[64];    /* META; INCIDENT: its kind */
-    int camera;      /* INCIDENT: of the rig, −1 none */
+    int camera;      /* INCIDENT, CLOCK, DEVICE: of the rig, −1 none */
     int64_t time_us; /* INCIDENT, SWEEP: Unix time */
-    int sweep;       /* SWEEP: its number in the capture */
-    bool ended;
-    bool verify; /* SEAL: every file is read again first */
+    int sweep;       /* SHOT, SWEEP, CLOCK: its number in the capture */
+    bool ended;      /* SWEEP; otherwise it begins */
+    struct lumi_capture_clock clock;
+    struct lumi_capture_device device;
+    bool verify; /* SEAL: every file is read again first; LUMI_ERR_CHECKSUM, and no seal, where one has changed */
     char date[16];
 };
 
@@ -73,7 +77,8 @@ struct lumi_store_done {
     enum lumi_store_job_kind kind;
     int code; /* LUMI_ERR_NOSPACE and the like; the frame is then as it was before */
     char text[512];
-    int64_t frame; /* RETAKE: the new row */
+    int64_t frame; /* the job's; RETAKE: the new row */
+    int64_t shot;  /* RETAKE: the new frame's; the retakes of a shot share one until it is fired */
     size_t bytes;
     double seconds; /* from given to done */
 };
@@ -87,20 +92,25 @@ struct lumi_store_options {
     /* What a disk would answer, for simulated ones: LUMI_OK, or a code with its text (LUMI_ERR_NOSPACE) in place of
      * writing so many bytes; asked before every file. NULL: the disk itself answers. */
     int (*disk)(void *context, size_t bytes, struct lumi_error *error);
+    /* For the figures, in nanoseconds; NULL: CLOCK_MONOTONIC, and where synchronous time stands still. */
+    int64_t (*now)(void *context);
     void *context;
 };
 void lumi_store_options_init(struct lumi_store_options *options);
 
-/* The capture is open for writing and becomes the store's, also on failure of later jobs; lumi_store_close closes it.
- */
+/* The capture is open for writing and becomes the store's if this succeeds; lumi_store_close closes it. */
 int lumi_store_open(struct lumi_capture *capture, const struct lumi_store_options *options, struct lumi_store **store,
                     struct lumi_error *error);
 /* Finishes what was given, then closes. */
 int lumi_store_close(struct lumi_store *store, struct lumi_error *error);
 
-/* Copies the job (not the pieces). LUMI_ERR_LIMIT: no room for its bytes. */
+/* Copies the job (not the pieces). LUMI_ERR_LIMIT: no room for its bytes; one frame always has room where nothing else
+ * waits. Jobs of one frame are done in their order, a seal after all that were given before it; otherwise a row does
+ * not wait for the bytes of another frame. */
 int lumi_store_give(struct lumi_store *store, const struct lumi_store_job *job, struct lumi_error *error);
 bool lumi_store_done(struct lumi_store *store, struct lumi_store_done *done); /* the next; false: none */
+/* Bytes that may still be given. */
+size_t lumi_store_room(struct lumi_store *store);
 /* synchronous: does at most `jobs` jobs (0: all) on this thread. */
 void lumi_store_work(struct lumi_store *store, int jobs);
 
@@ -121,8 +131,10 @@ void lumi_store_figures(struct lumi_store *store, struct lumi_store_figures *fig
 int lumi_store_disk(const char *path, int64_t *free_bytes, struct lumi_error *error);
 int lumi_store_measure(const char *path, size_t bytes, double *bytes_per_second, struct lumi_error *error);
 
-/* Rows for a plan of this rig, in a capture that has none: cameras, lenses, positions, shots, frames with their prior
- * poses (proto/mechanism/kinematics.h), names "cCC-tTT-pPPP[-bB]", profile and plan as text. In one transaction. */
+/* Rows for a plan of this rig, in a capture that has none: cameras (all of the rig, in its order), lenses, positions,
+ * shots (with their number in the plan), frames with their prior poses (proto/mechanism/kinematics.h), names
+ * "cCC-tTT-pPPP[-bB]", profile and plan as text. A video has neither positions nor frames. In one transaction; for a
+ * plan that passed lumi_plan_check. Called before lumi_store_open. */
 int lumi_store_plan(struct lumi_capture *capture, const struct lumi_rig *rig, const struct lumi_plan *plan,
                     struct lumi_error *error);
 

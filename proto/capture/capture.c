@@ -408,6 +408,21 @@ void lumi_capture_rollback(struct lumi_capture *capture)
     capture->in_batch = false;
 }
 
+/* Undoing rows alone would leave a file without one: files of a step that fails are undone by who stored them. */
+int lumi_capture_guard(struct lumi_capture *capture, struct lumi_error *error)
+{
+    return capture_db_run(capture, error, "SAVEPOINT guard", "");
+}
+
+int lumi_capture_guarded(struct lumi_capture *capture, int code, struct lumi_error *error)
+{
+    if (code == LUMI_OK)
+        return capture_db_run(capture, error, "RELEASE guard", "");
+    sqlite3_exec(capture->db, "ROLLBACK TO guard", NULL, NULL, NULL);
+    sqlite3_exec(capture->db, "RELEASE guard", NULL, NULL, NULL);
+    return code;
+}
+
 bool lumi_capture_in_batch(const struct lumi_capture *capture)
 {
     return capture->in_batch && !sqlite3_get_autocommit(capture->db);

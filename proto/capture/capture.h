@@ -65,6 +65,11 @@ void lumi_capture_rollback(struct lumi_capture *capture);
  * then only lumi_capture_rollback may follow. */
 bool lumi_capture_in_batch(const struct lumi_capture *capture);
 
+/* Inside a batch: what is done between these is kept whole or undone alone. `code` 0 keeps; returns code, or why it
+ * could not be kept. Not nested. */
+int lumi_capture_guard(struct lumi_capture *capture, struct lumi_error *error);
+int lumi_capture_guarded(struct lumi_capture *capture, int code, struct lumi_error *error);
+
 bool lumi_capture_sealed(const struct lumi_capture *capture);
 /* The directory as it was opened (the .partial one while it is that); owned by the capture. */
 const char *lumi_capture_path(const struct lumi_capture *capture);
@@ -114,6 +119,9 @@ int lumi_capture_add_shot(struct lumi_capture *capture, int64_t position, int nu
 /* Which shot of the plan it is (lumi_plan_shots), and the sweep in which it was fired; −1: none. */
 int lumi_capture_set_shot(struct lumi_capture *capture, int64_t shot, int plan_shot, int sweep,
                           struct lumi_error *error);
+/* The shot of this frame was fired in that sweep. */
+int lumi_capture_fire_shot(struct lumi_capture *capture, int64_t frame, int sweep, struct lumi_error *error);
+int lumi_capture_shot_of(struct lumi_capture *capture, int64_t frame, int64_t *shot, struct lumi_error *error);
 
 /* The device that took the frames of a camera of the capture. */
 struct lumi_capture_device {
@@ -161,15 +169,16 @@ struct lumi_capture_new_frame {
 int lumi_capture_add_frame(struct lumi_capture *capture, const struct lumi_capture_new_frame *frame, int64_t *id,
                            struct lumi_error *error);
 
-/* planned → triggered. Microseconds of the rig's clock, or LUMI_NO_TIME. Of a frame that has gone further only the time
- * is kept. */
+/* planned → triggered. Microseconds of the rig's clock, or LUMI_NO_TIME. A frame that has gone further only gets its
+ * time, if it has none. */
 int lumi_capture_trigger_frame(struct lumi_capture *capture, int64_t frame, int64_t trigger_time_us,
                                struct lumi_error *error);
 
 /* The middle of the exposure as an edge of its sync line told it, in the clock of the trigger; whatever the state. */
 int lumi_capture_expose_frame(struct lumi_capture *capture, int64_t frame, int64_t exposed_time_us,
                               struct lumi_error *error);
-/* planned or triggered → rejected: it will not come, and why. Should its file come all the same, it can be stored. */
+/* It will not come, and why: triggered → rejected, and a planned one keeps its state. Should its file come all the
+ * same, it can be stored. */
 int lumi_capture_lose_frame(struct lumi_capture *capture, int64_t frame, const char *reason, struct lumi_error *error);
 
 /* What is known of a stored file; zero (LUMI_NO_TIME) where it is not. */

@@ -17,6 +17,19 @@ int lumi_capture_set_shot(struct lumi_capture *capture, int64_t shot, int plan_s
                           (int64_t)plan_shot, (int64_t)sweep, shot);
 }
 
+int lumi_capture_fire_shot(struct lumi_capture *capture, int64_t frame, int sweep, struct lumi_error *error)
+{
+    LUMI_TRY(capture_need_writable(capture, error));
+    return capture_db_run(capture, error,
+                          "UPDATE shots SET sweep = nullif(?, -1) WHERE id = (SELECT shot FROM frames WHERE id = ?)",
+                          "ii", (int64_t)sweep, frame);
+}
+
+int lumi_capture_shot_of(struct lumi_capture *capture, int64_t frame, int64_t *shot, struct lumi_error *error)
+{
+    return capture_db_int(capture, shot, error, "SELECT shot FROM frames WHERE id = ?", "i", frame);
+}
+
 int lumi_capture_shot_frames(struct lumi_capture *capture, int64_t shot, int64_t *frames, int cameras,
                              struct lumi_error *error)
 {

@@ -257,8 +257,9 @@ int lumi_capture_trigger_frame(struct lumi_capture *capture, int64_t frame, int6
 
     LUMI_TRY(need_state(capture, frame, any, LUMI_FRAME_TRIGGERED, name, error));
     LUMI_TRY(capture_db_enter(capture, error));
-    int code = capture_db_run(capture, error, "UPDATE frames SET trigger_time_us = nullif(?, ?) WHERE id = ?", "iii",
-                              trigger_time_us, LUMI_NO_TIME, frame);
+    int code = capture_db_run(capture, error,
+                              "UPDATE frames SET trigger_time_us = ifnull(trigger_time_us, nullif(?, ?)) WHERE id = ?",
+                              "iii", trigger_time_us, LUMI_NO_TIME, frame);
     if (code == LUMI_OK)
         code = capture_db_run(capture, error,
                               "UPDATE frames SET state = 'triggered' WHERE id = ? AND state = 'planned'", "i", frame);
@@ -282,8 +283,12 @@ int lumi_capture_lose_frame(struct lumi_capture *capture, int64_t frame, const c
 
     LUMI_TRY(need_state(capture, frame, 1u << LUMI_FRAME_PLANNED | 1u << LUMI_FRAME_TRIGGERED, LUMI_FRAME_REJECTED,
                         name, error));
-    return capture_db_run(capture, error, "UPDATE frames SET state = 'rejected', reason = ? WHERE id = ?", "ti", reason,
-                          frame);
+    LUMI_TRY(capture_db_enter(capture, error));
+    int code = capture_db_run(capture, error, "UPDATE frames SET reason = ? WHERE id = ?", "ti", reason, frame);
+    if (code == LUMI_OK)
+        code = capture_db_run(capture, error,
+                              "UPDATE frames SET state = 'rejected' WHERE id = ? AND state = 'triggered'", "i", frame);
+    return capture_db_leave(capture, code, error);
 }
 
 int lumi_capture_judge_frame(struct lumi_capture *capture, int64_t frame, bool accepted, double sharpness,

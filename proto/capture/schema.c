@@ -23,7 +23,7 @@
     "cameras(id), frame INTEGER REFERENCES frames(id), text TEXT NOT NULL) STRICT"
 #define FRAMES_ADVANCE                                                                                                 \
     "CREATE TRIGGER frames_advance BEFORE UPDATE OF state ON frames WHEN NOT ("                                        \
-    "OLD.state = 'planned' AND NEW.state IN ('triggered', 'received', 'rejected') OR "                                 \
+    "OLD.state = 'planned' AND NEW.state IN ('triggered', 'received') OR "                                             \
     "OLD.state = 'triggered' AND NEW.state IN ('received', 'rejected') OR "                                            \
     "OLD.state = 'received' AND NEW.state IN ('accepted', 'rejected') OR "                                             \
     "OLD.state = 'accepted' AND NEW.state = 'rejected' OR "                                                            \

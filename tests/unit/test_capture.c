@@ -134,7 +134,7 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
     FAILS(lumi_capture_judge_frame(capture, id, true, 1, NULL, error), LUMI_ERR_ARG, "'f' is planned");
     FAILS(lumi_capture_retake_frame(capture, id, &again, error), LUMI_ERR_ARG, "cannot become retaken");
     OK(lumi_capture_trigger_frame(capture, id, 5, error));
-    OK(lumi_capture_trigger_frame(capture, id, 6, error)); /* told again: the time is kept */
+    OK(lumi_capture_trigger_frame(capture, id, 6, error)); /* told again: the first time is kept */
     OK(lumi_capture_store_bytes(capture, id, "x", 1, &file, error));
     FAILS(lumi_capture_store_bytes(capture, id, "y", 1, &file, error), LUMI_ERR_ARG, "received already");
     OK(lumi_capture_judge_frame(capture, id, true, 0.5, NULL, error));
@@ -155,7 +155,7 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
     assert_string_equal(frames[2].name, "f.2.2");
     assert_int_equal(frames[2].shot, 2);
     assert_int_equal(frames[0].state, LUMI_FRAME_RETAKEN);
-    assert_int_equal(frames[0].trigger_time_us, 6);
+    assert_int_equal(frames[0].trigger_time_us, 5);
     assert_int_equal(frames[2].retake_of, again);
     lumi_free(frames);
     lumi_capture_close(capture);
