@@ -100,16 +100,10 @@ static void a_plan_becomes_rows_with_prior_poses(void **state)
     lumi_capture_close(capture);
 }
 
-/* The life of a frame and what surrounds it; the capture is sound and sealed in the end. */
-static void life(void **state, const char *name, bool synchronous)
+/* The life of a frame and what surrounds it. */
+static void live(struct lumi_store *store)
 {
-    struct lumi_store *store = opened(planned(state, name), synchronous);
     unsigned char bytes[9000];
-    struct lumi_capture_frame *frames;
-    struct lumi_capture *capture;
-    struct lumi_capture_sweep *sweeps;
-    struct lumi_capture_incident *incidents;
-    int count;
 
     for (size_t i = 0; i < sizeof bytes; i++)
         bytes[i] = (unsigned char)(i * 7 ^ i >> 3);
@@ -152,7 +146,18 @@ static void life(void **state, const char *name, bool synchronous)
     assert_int_equal(done_of(store, &job).code, LUMI_OK);
     FAILS(lumi_store_give(store, &job, error), LUMI_ERR_ARG, "sealed");
     OK(lumi_store_close(store, error));
+}
 
+/* The capture is sound and sealed in the end. */
+static void life(void **state, const char *name, bool synchronous)
+{
+    struct lumi_capture_frame *frames;
+    struct lumi_capture *capture;
+    struct lumi_capture_sweep *sweeps;
+    struct lumi_capture_incident *incidents;
+    int count;
+
+    live(opened(planned(state, name), synchronous));
     assert_int_equal(problems_of(in_scratch(state, name)), 0);
     OK(lumi_capture_open(in_scratch(state, name), LUMI_CAPTURE_READ, &capture, error));
     assert_true(lumi_capture_sealed(capture));
@@ -163,7 +168,7 @@ static void life(void **state, const char *name, bool synchronous)
     assert_true(frames[0].judgement.blur_pixels == 3 && isnan(frames[0].judgement.moved));
     assert_string_equal(frames[0].reason, "smeared");
     assert_string_equal(frames[0].file, "data/frames/c00-t00-p000-b0.raw");
-    assert_int_equal(frames[0].bytes, sizeof bytes);
+    assert_int_equal(frames[0].bytes, 9000);
     assert_int_equal(frames[4].retake_of, 1);
     assert_int_equal(frames[4].plan_shot, 0);
     assert_int_equal(frames[4].sweep, 1);
