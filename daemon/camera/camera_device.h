@@ -42,6 +42,8 @@ struct lumi_frame_format {
     int width, height;
     int bits;   /* a sample */
     int stride; /* bytes a row */
+    /* YUYV, NV12; JPEG says it itself: ITU-R BT.709's matrix instead of BT.601's, 0..255 instead of 16..235 */
+    bool bt709, full_range;
 };
 /* Bytes of a whole frame of this format; 0 for JPEG and FILE, whose size differs. */
 size_t lumi_frame_bytes(const struct lumi_frame_format *format);
@@ -53,6 +55,7 @@ struct lumi_camera_frame {
     const char *path;        /* FILE only; the file stays where it is until the frame is released */
     int64_t file_mtime_ns;   /* FILE only: Unix time of its last change, LUMI_CAMERA_NO_TIME otherwise */
     int64_t device_ns;       /* the camera's clock, at the beginning of the exposure where it can, see identity */
+    bool at_end;             /* device_ns is of the frame's end instead */
     int64_t host_ns;         /* CLOCK_MONOTONIC when its last byte was here */
     uint64_t sequence;       /* the device's own count */
     uint32_t gap;            /* frames that the sequence says were lost just before this one */
