@@ -21,12 +21,13 @@ void lumi_judge_picture_destroy(struct lumi_judge_picture *picture);
 struct lumi_judge_numbers {
     double sharpness; /* share of the detail that an ideal lens would leave; comparable between frames of one camera */
     double blur_pixels;    /* length of the smear along its direction, from the picture's spectrum; 0: none seen */
+    double blur_angle;     /* its direction, radians from the picture's x towards y, 0..π */
     double clipped;        /* share of pixels at white */
     double dark;           /* share at black */
     double mean;           /* linear, 0..1 */
     double exposure_stops; /* against neighbours, where they overlap; NaN: no neighbour */
     double shift_pixels;   /* of the picture against where its pose says it looks, from its neighbours; NaN unknown */
-    double moved;          /* share of the overlap that differs beyond parallax and noise: things that moved */
+    double moved; /* share of the overlap that differs beyond parallax and noise: things that moved; NaN unknown */
 };
 struct lumi_judge_neighbour {
     const struct lumi_judge_picture *picture;
