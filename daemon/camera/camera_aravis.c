@@ -8,7 +8,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#define BUFFERS 8       /* of the pool, where the setting does not say */
+#define BUFFERS 8        /* of the pool, where the setting does not say */
 #define STREAM_BUFFERS 4 /* that packets are put into; a frame is copied out of them as it comes */
 
 static struct aravis_camera *own(struct lumi_camera *camera)
@@ -262,7 +262,8 @@ static bool has_frame(ArvBuffer *buffer)
 static struct lumi_camera_frame *take_frame(struct aravis_camera *camera, ArvBuffer *buffer)
 {
     struct lumi_camera_frame *frame = has_frame(buffer) ? copy_frame(camera, buffer) : NULL;
-    const uint64_t resent = stream_count(camera, "n_resent_packets"), missing = stream_count(camera, "n_missing_packets");
+    const uint64_t resent = stream_count(camera, "n_resent_packets"),
+                   missing = stream_count(camera, "n_missing_packets");
     const uint64_t id = arv_buffer_get_frame_id(buffer), stamp = arv_buffer_get_timestamp(buffer);
     const uint32_t gap = has_frame(buffer) ? gap_before(camera, id) : 0;
 

@@ -1,5 +1,5 @@
-/* Which GigE Vision and USB3 Vision cameras are there. GigE Vision ones are asked for here and not through Aravis, whose
- * list holds cameras by their serial number: of two that have the same it shows one. */
+/* Which GigE Vision and USB3 Vision cameras are there. GigE Vision ones are asked for here and not through Aravis,
+ * whose list holds cameras by their serial number: of two that have the same it shows one. */
 #define _DEFAULT_SOURCE /* IFF_UP */
 #include "daemon/camera/camera_aravis_priv.h"
 
@@ -14,9 +14,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#define GVCP_PORT 3956        /* GigE Vision 2.0, 14.2 */
-#define DISCOVERY_ID 0x4c55   /* of our request; the answer has it too */
-#define DISCOVERY_MS 500      /* until all have answered: a camera may take its time, 14.4 */
+#define GVCP_PORT 3956      /* GigE Vision 2.0, 14.2 */
+#define DISCOVERY_ID 0x4c55 /* of our request; the answer has it too */
+#define DISCOVERY_MS 500    /* until all have answered: a camera may take its time, 14.4 */
 #define INTERFACES_MAX 64
 #define FOUND_MAX 128
 

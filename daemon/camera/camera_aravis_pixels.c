@@ -15,9 +15,10 @@ static bool take(const char **text, const char *word)
 
 static bool take_layout(const char **name, struct aravis_pixels *pixels)
 {
-    static const char *const filters[] = {
-        [LUMI_BAYER_RGGB] = "BayerRG", [LUMI_BAYER_GRBG] = "BayerGR", [LUMI_BAYER_GBRG] = "BayerGB",
-        [LUMI_BAYER_BGGR] = "BayerBG"};
+    static const char *const filters[] = {[LUMI_BAYER_RGGB] = "BayerRG",
+                                          [LUMI_BAYER_GRBG] = "BayerGR",
+                                          [LUMI_BAYER_GBRG] = "BayerGB",
+                                          [LUMI_BAYER_BGGR] = "BayerBG"};
 
     pixels->layout = LUMI_LAYOUT_BAYER;
     for (int i = 0; i < 4; i++)
@@ -35,12 +36,9 @@ bool aravis_pixels_of_name(const char *name, struct aravis_pixels *pixels)
         const char *name;
         struct aravis_pixels pixels;
     } whole[] = {
-        {"JPEG", {LUMI_LAYOUT_JPEG, 0, 8, ARAVIS_PLAIN}},
-        {"RGB8", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_PLAIN}},
-        {"RGB8Packed", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_PLAIN}},
-        {"BGR8", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_BGR}},
-        {"BGR8Packed", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_BGR}},
-        {"YUV422_8", {LUMI_LAYOUT_YUYV, 0, 8, ARAVIS_PLAIN}},
+        {"JPEG", {LUMI_LAYOUT_JPEG, 0, 8, ARAVIS_PLAIN}},       {"RGB8", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_PLAIN}},
+        {"RGB8Packed", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_PLAIN}},  {"BGR8", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_BGR}},
+        {"BGR8Packed", {LUMI_LAYOUT_RGB, 0, 8, ARAVIS_BGR}},    {"YUV422_8", {LUMI_LAYOUT_YUYV, 0, 8, ARAVIS_PLAIN}},
         {"YCbCr422_8", {LUMI_LAYOUT_YUYV, 0, 8, ARAVIS_PLAIN}},
     };
     static const int depths[] = {8, 10, 12, 14, 16};

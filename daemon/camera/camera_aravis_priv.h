@@ -54,14 +54,14 @@ struct aravis_camera {
     struct aravis_pixels pixels;
     struct lumi_frame_format format;
     const char *chunk_exposure, *chunk_gain, *chunk_trigger; /* names of the features that the camera has, or NULL */
-    int packet_size, packet_delay; /* options; 0: found out, none */
+    int packet_size, packet_delay;                           /* options; 0: found out, none */
     bool packet_resend;
     int packet_timeout_us, frame_retention_us; /* 0: Aravis' own */
     uint32_t action_device, action_group, action_mask;
     uint64_t last_id; /* of the last frame, when `seen` */
     bool seen;
     uint64_t frames, dropped, damaged, resent, missing; /* since armed */
-    double set_exposure, set_gain;                       /* what the camera said after the last setting */
+    double set_exposure, set_gain;                      /* what the camera said after the last setting */
 };
 
 /* Takes and frees `problem`. LUMI_ERR_IO where the camera did not answer, else LUMI_ERR_UNSUPPORTED. */

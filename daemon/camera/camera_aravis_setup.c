@@ -270,8 +270,7 @@ static int set_trigger(struct aravis_camera *camera, const struct lumi_camera_se
     if (setting->trigger == LUMI_TRIGGER_FREE) {
         TRY_ARV(camera, "running free", arv_camera_clear_triggers(camera->camera, &problem));
         if (setting->frame_rate > 0)
-            TRY_ARV(camera, "its frame rate",
-                    arv_camera_set_frame_rate(camera->camera, setting->frame_rate, &problem));
+            TRY_ARV(camera, "its frame rate", arv_camera_set_frame_rate(camera->camera, setting->frame_rate, &problem));
         return LUMI_OK;
     }
     if (setting->trigger == LUMI_TRIGGER_SOFTWARE && strncmp(input, "Action", 6) != 0)

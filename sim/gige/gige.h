@@ -24,9 +24,9 @@ struct sim_gige_fault {
     double loss; /* share of its packets that are not sent the first time */
 };
 struct sim_gige_exposure {
-    bool line;                  /* by the hardware line; otherwise as `fire` asked */
-    uint64_t begin_ns, end_ns;  /* by the clock that all share */
-    double angle, drop, moved;  /* the rig at the middle, and how far it turned; the source's to read */
+    bool line;                 /* by the hardware line; otherwise as `fire` asked */
+    uint64_t begin_ns, end_ns; /* by the clock that all share */
+    double angle, drop, moved; /* the rig at the middle, and how far it turned; the source's to read */
     struct sim_gige_fault fault;
 };
 
@@ -70,10 +70,10 @@ void sim_gige_unplug(struct sim_gige *gige, int camera, bool unplugged);
 
 struct sim_gige_status {
     bool acquiring, controlled;
-    uint64_t triggers, frames;        /* edges of its line, frames sent */
-    uint64_t packets, lost, resent;   /* sent, left out, sent again as asked */
-    int waiting;                      /* exposures whose frames are still to come */
-    double exposure;                  /* s, as it is set */
+    uint64_t triggers, frames;      /* edges of its line, frames sent */
+    uint64_t packets, lost, resent; /* sent, left out, sent again as asked */
+    int waiting;                    /* exposures whose frames are still to come */
+    double exposure;                /* s, as it is set */
 };
 void sim_gige_status(struct sim_gige *gige, int camera, struct sim_gige_status *status);
 

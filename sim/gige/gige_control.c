@@ -60,8 +60,8 @@ static void compute_payload(struct gige_registers *r)
 {
     static const unsigned sizes[GIGE_CHUNKS] = {0, 8, 8, 8, 8, 8};
     const unsigned mask = gige_get(r, GIGE_CHUNK_MASK);
-    size_t bytes = gige_format_bytes(gige_get(r, GIGE_PIXEL_FORMAT), (int)gige_get(r, GIGE_WIDTH),
-                                     (int)gige_get(r, GIGE_HEIGHT));
+    size_t bytes =
+        gige_format_bytes(gige_get(r, GIGE_PIXEL_FORMAT), (int)gige_get(r, GIGE_WIDTH), (int)gige_get(r, GIGE_HEIGHT));
 
     if (gige_get(r, GIGE_CHUNK_MODE)) {
         bytes = (bytes + 3) / 4 * 4 + 8;

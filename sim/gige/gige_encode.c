@@ -164,10 +164,11 @@ static uint64_t real_bits(double value)
 
 static int add_chunks(const struct gige_shot *shot, uint8_t **data, size_t *size)
 {
-    const uint64_t values[GIGE_CHUNKS] = {
-        [GIGE_CHUNK_EXPOSURE] = real_bits(shot->exposure_us), [GIGE_CHUNK_GAIN] = real_bits(shot->gain_db),
-        [GIGE_CHUNK_TIMESTAMP] = shot->timestamp,             [GIGE_CHUNK_FRAME_ID] = shot->frame_id,
-        [GIGE_CHUNK_COUNTER] = shot->counter};
+    const uint64_t values[GIGE_CHUNKS] = {[GIGE_CHUNK_EXPOSURE] = real_bits(shot->exposure_us),
+                                          [GIGE_CHUNK_GAIN] = real_bits(shot->gain_db),
+                                          [GIGE_CHUNK_TIMESTAMP] = shot->timestamp,
+                                          [GIGE_CHUNK_FRAME_ID] = shot->frame_id,
+                                          [GIGE_CHUNK_COUNTER] = shot->counter};
     struct writer w = {lumi_calloc(*size + 4 + 8 + GIGE_CHUNKS * 16, 1), *size};
 
     if (!w.data)

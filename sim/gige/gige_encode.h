@@ -13,7 +13,7 @@ struct gige_shot {
     int width, height; /* of the picture's upper left part */
     double brightness; /* what exposure and gain make of 1 */
     struct sim_sensor sensor;
-    uint64_t number;  /* every frame its own noise */
+    uint64_t number; /* every frame its own noise */
     int jpeg_quality;
     /* Chunk data, where `chunks` has a bit (GIGE_CHUNK_…); 0: none. */
     unsigned chunks;

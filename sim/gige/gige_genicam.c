@@ -113,14 +113,27 @@ static void categories(struct writer *w)
 {
     static const char *const root[] = {"DeviceControl",    "ImageFormatControl",    "AcquisitionControl",
                                        "ChunkDataControl", "TransportLayerControl", NULL};
-    static const char *const device[] = {"DeviceVendorName", "DeviceModelName", "DeviceVersion",
+    static const char *const device[] = {"DeviceVendorName",   "DeviceModelName",   "DeviceVersion",
                                          "DeviceSerialNumber", "DeviceTemperature", NULL};
     static const char *const image[] = {"SensorWidth", "SensorHeight", "Width", "Height", "PixelFormat", NULL};
-    static const char *const acquisition[] = {
-        "AcquisitionMode", "AcquisitionStart", "AcquisitionStop",  "AcquisitionFrameRate", "TriggerSelector",
-        "TriggerMode",     "TriggerSource",    "TriggerActivation", "TriggerSoftware",     "ExposureTime",
-        "Gain",            "ActionDeviceKey",  "ActionSelector",    "ActionGroupKey",      "ActionGroupMask",
-        "CounterSelector", "CounterEventSource", NULL};
+    static const char *const acquisition[] = {"AcquisitionMode",
+                                              "AcquisitionStart",
+                                              "AcquisitionStop",
+                                              "AcquisitionFrameRate",
+                                              "TriggerSelector",
+                                              "TriggerMode",
+                                              "TriggerSource",
+                                              "TriggerActivation",
+                                              "TriggerSoftware",
+                                              "ExposureTime",
+                                              "Gain",
+                                              "ActionDeviceKey",
+                                              "ActionSelector",
+                                              "ActionGroupKey",
+                                              "ActionGroupMask",
+                                              "CounterSelector",
+                                              "CounterEventSource",
+                                              NULL};
     static const char *const chunk[] = {"ChunkModeActive", "ChunkSelector", "ChunkEnable", NULL};
     static const char *const transport[] = {"PayloadSize", "GevSCPSPacketSize", "GevSCPSFireTestPacket", NULL};
 
@@ -134,18 +147,22 @@ static void categories(struct writer *w)
 
 static void features(struct writer *w, const struct gige_identity *identity)
 {
-    static const struct entry formats[] = {
-        {"BayerRG8", GIGE_RG8},     {"BayerRG10", GIGE_RG10},        {"BayerRG12", GIGE_RG12},
-        {"BayerRG16", GIGE_RG16},   {"BayerRG10p", GIGE_RG10P},      {"BayerRG12p", GIGE_RG12P},
-        {"BayerRG12Packed", GIGE_RG12_PACKED}, {"Mono8", GIGE_MONO8}, {"RGB8", GIGE_RGB8},
-        {"JPEG", GIGE_JPEG},        {NULL, 0}};
+    static const struct entry formats[] = {{"BayerRG8", GIGE_RG8},
+                                           {"BayerRG10", GIGE_RG10},
+                                           {"BayerRG12", GIGE_RG12},
+                                           {"BayerRG16", GIGE_RG16},
+                                           {"BayerRG10p", GIGE_RG10P},
+                                           {"BayerRG12p", GIGE_RG12P},
+                                           {"BayerRG12Packed", GIGE_RG12_PACKED},
+                                           {"Mono8", GIGE_MONO8},
+                                           {"RGB8", GIGE_RGB8},
+                                           {"JPEG", GIGE_JPEG},
+                                           {NULL, 0}};
     static const struct entry modes[] = {{"Continuous", 0}, {NULL, 0}};
     static const struct entry selectors[] = {{"FrameStart", 0}, {NULL, 0}};
     static const struct entry on_off[] = {{"Off", 0}, {"On", 1}, {NULL, 0}};
-    static const struct entry sources[] = {{"Software", GIGE_SOURCE_SOFTWARE},
-                                           {"Line1", GIGE_SOURCE_LINE1},
-                                           {"Action1", GIGE_SOURCE_ACTION1},
-                                           {NULL, 0}};
+    static const struct entry sources[] = {
+        {"Software", GIGE_SOURCE_SOFTWARE}, {"Line1", GIGE_SOURCE_LINE1}, {"Action1", GIGE_SOURCE_ACTION1}, {NULL, 0}};
     static const struct entry edges[] = {{"RisingEdge", 0}, {"FallingEdge", 1}, {NULL, 0}};
 
     string_register(w, "DeviceVendorName", 0x48, 32);
@@ -194,10 +211,13 @@ static void chunk_integer(struct writer *w, const char *name, const char *port, 
 
 static void chunks(struct writer *w)
 {
-    static const struct entry selectors[] = {
-        {"Image", GIGE_CHUNK_IMAGE},         {"ExposureTime", GIGE_CHUNK_EXPOSURE}, {"Gain", GIGE_CHUNK_GAIN},
-        {"Timestamp", GIGE_CHUNK_TIMESTAMP}, {"FrameID", GIGE_CHUNK_FRAME_ID},      {"CounterValue", GIGE_CHUNK_COUNTER},
-        {NULL, 0}};
+    static const struct entry selectors[] = {{"Image", GIGE_CHUNK_IMAGE},
+                                             {"ExposureTime", GIGE_CHUNK_EXPOSURE},
+                                             {"Gain", GIGE_CHUNK_GAIN},
+                                             {"Timestamp", GIGE_CHUNK_TIMESTAMP},
+                                             {"FrameID", GIGE_CHUNK_FRAME_ID},
+                                             {"CounterValue", GIGE_CHUNK_COUNTER},
+                                             {NULL, 0}};
     static const struct entry counters[] = {{"Counter0", 0}, {NULL, 0}};
     static const struct entry events[] = {{"Off", 0}, {"FrameTrigger", 1}, {NULL, 0}};
 
@@ -220,8 +240,9 @@ static void chunks(struct writer *w)
 
 static void transport(struct writer *w)
 {
-    put(w, "<Integer Name=\"GevSCPSPacketSize\" NameSpace=\"Standard\"><pValue>PacketSizeRegister</pValue><Min>220</Min>"
-           "<Max>16384</Max><Inc>4</Inc></Integer>\n");
+    put(w,
+        "<Integer Name=\"GevSCPSPacketSize\" NameSpace=\"Standard\"><pValue>PacketSizeRegister</pValue><Min>220</Min>"
+        "<Max>16384</Max><Inc>4</Inc></Integer>\n");
     put(w,
         "<MaskedIntReg Name=\"PacketSizeRegister\"><Address>0x%x</Address><Length>4</Length><AccessMode>RW</AccessMode>"
         "<pPort>Device</pPort><Cachable>NoCache</Cachable><LSB>31</LSB><MSB>16</MSB><Sign>Unsigned</Sign>"
@@ -229,7 +250,8 @@ static void transport(struct writer *w)
         GIGE_PACKET_SIZE);
     put(w,
         "<MaskedIntReg Name=\"FireTestRegister\"><Address>0x%x</Address><Length>4</Length><AccessMode>RW</AccessMode>"
-        "<pPort>Device</pPort><Cachable>NoCache</Cachable><Bit>0</Bit><Endianess>BigEndian</Endianess></MaskedIntReg>\n",
+        "<pPort>Device</pPort><Cachable>NoCache</Cachable><Bit>0</Bit><Endianess>BigEndian</Endianess></"
+        "MaskedIntReg>\n",
         GIGE_PACKET_SIZE);
     command(w, "GevSCPSFireTestPacket", "FireTestRegister", 1);
 }

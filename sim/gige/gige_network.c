@@ -40,9 +40,8 @@ int gige_sockets_open(struct gige_camera *camera, struct lumi_error *error)
 
     camera->gvcp = open_socket(address, GIGE_PORT, false);
     if (camera->gvcp < 0)
-        return lumi_fail(error, errno == EADDRINUSE ? LUMI_ERR_BUSY : LUMI_ERR_IO,
-                         "camera %s: %s cannot be had: %s", camera->options.serial, camera->options.address,
-                         strerror(errno));
+        return lumi_fail(error, errno == EADDRINUSE ? LUMI_ERR_BUSY : LUMI_ERR_IO, "camera %s: %s cannot be had: %s",
+                         camera->options.serial, camera->options.address, strerror(errno));
     camera->broadcast = open_socket(htonl(ntohl(address) | 0xffffff), GIGE_PORT, true);
     camera->gvsp = open_socket(address, 0, false);
     if (camera->gvsp < 0)
@@ -80,8 +79,8 @@ static void send_again(struct gige_camera *camera)
     if (!gige_destination(camera, &to))
         return;
     for (uint32_t i = c->resend_first; i <= c->resend_last && i - c->resend_first < 4096; i++) {
-        const size_t size = block ? gige_stream_packet(block, i, packet)
-                                  : gige_stream_refusal(c->resend_block, i, packet);
+        const size_t size =
+            block ? gige_stream_packet(block, i, packet) : gige_stream_refusal(c->resend_block, i, packet);
 
         (void)!sendto(camera->gvsp, packet, size, MSG_DONTWAIT, (struct sockaddr *)&to, sizeof to);
         camera->status.resent += block != NULL;

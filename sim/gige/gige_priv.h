@@ -42,7 +42,7 @@ struct sim_gige {
     bool network_runs;
 };
 
-uint64_t gige_clock_ns(void); /* CLOCK_MONOTONIC */
+uint64_t gige_clock_ns(void);                                       /* CLOCK_MONOTONIC */
 uint64_t gige_ticks(const struct gige_camera *camera, uint64_t ns); /* of the camera's clock, at shared time `ns` */
 
 /* gige_network.c */

@@ -8,7 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define CAPABILITIES 0xc0000067u /* user name, serial number; action, pending ack, resend, write memory, concatenation */
+#define CAPABILITIES                                                                                                   \
+    0xc0000067u /* user name, serial number; action, pending ack, resend, write memory, concatenation */
 
 uint8_t *gige_register(struct gige_registers *r, uint32_t address, size_t size)
 {

@@ -9,12 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum {
-    GIGE_BOOT_SIZE = 0x1000,
-    GIGE_OWN = 0x10000,
-    GIGE_OWN_SIZE = 0x100,
-    GIGE_XML = 0x20000
-};
+enum { GIGE_BOOT_SIZE = 0x1000, GIGE_OWN = 0x10000, GIGE_OWN_SIZE = 0x100, GIGE_XML = 0x20000 };
 
 /* Bootstrap registers that do something. */
 enum {

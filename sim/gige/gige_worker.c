@@ -10,8 +10,8 @@
 #include <sys/socket.h>
 #include <time.h>
 
-#define BURST 65536         /* bytes that go out without a pause: a receiver's buffer is not endless */
-#define PAUSE_NS 800000     /* between bursts */
+#define BURST 65536     /* bytes that go out without a pause: a receiver's buffer is not endless */
+#define PAUSE_NS 800000 /* between bursts */
 enum { CHANNEL_LOSS = 41 };
 
 /* A frame under way. */
@@ -87,19 +87,18 @@ static void take(struct gige_camera *camera, struct job *job)
     camera->busy = true;
     job->camera = camera;
     const double seconds = (double)(job->exposure.end_ns - job->exposure.begin_ns) * 1e-9;
-    *shot = (struct gige_shot){
-        .format = gige_get(r, GIGE_PIXEL_FORMAT),
-        .width = (int)gige_get(r, GIGE_WIDTH),
-        .height = (int)gige_get(r, GIGE_HEIGHT),
-        .brightness = seconds / camera->options.reference * pow(10, gain / 20),
-        .sensor = camera->options.sensor,
-        .number = ++camera->number,
-        .jpeg_quality = camera->options.jpeg_quality,
-        .chunks = gige_get(r, GIGE_CHUNK_MODE) ? gige_get(r, GIGE_CHUNK_MASK) : 0,
-        .exposure_us = seconds * 1e6,
-        .gain_db = gain,
-        .timestamp = gige_ticks(camera, job->exposure.begin_ns),
-        .counter = gige_get(r, GIGE_COUNTER_VALUE)};
+    *shot = (struct gige_shot){.format = gige_get(r, GIGE_PIXEL_FORMAT),
+                               .width = (int)gige_get(r, GIGE_WIDTH),
+                               .height = (int)gige_get(r, GIGE_HEIGHT),
+                               .brightness = seconds / camera->options.reference * pow(10, gain / 20),
+                               .sensor = camera->options.sensor,
+                               .number = ++camera->number,
+                               .jpeg_quality = camera->options.jpeg_quality,
+                               .chunks = gige_get(r, GIGE_CHUNK_MODE) ? gige_get(r, GIGE_CHUNK_MASK) : 0,
+                               .exposure_us = seconds * 1e6,
+                               .gain_db = gain,
+                               .timestamp = gige_ticks(camera, job->exposure.begin_ns),
+                               .counter = gige_get(r, GIGE_COUNTER_VALUE)};
     shot->sensor.seed = camera->options.seed;
     shot->counter -= (uint64_t)(job->exposure.line ? camera->count : 0); /* those that wait were counted already */
     camera->block = camera->block == UINT16_MAX ? 1 : (uint16_t)(camera->block + 1);
@@ -111,7 +110,9 @@ static void take(struct gige_camera *camera, struct job *job)
                                      .width = shot->width,
                                      .height = shot->height,
                                      .chunks = shot->chunks != 0,
-                                     .packet_size = size < 220 ? 220 : size > GIGE_STREAM_PACKET ? GIGE_STREAM_PACKET : size};
+                                     .packet_size = size < 220                  ? 220
+                                                    : size > GIGE_STREAM_PACKET ? GIGE_STREAM_PACKET
+                                                                                : size};
     job->delay_ticks = gige_get(r, GIGE_PACKET_DELAY);
 }
 
@@ -188,7 +189,8 @@ static void make(struct sim_gige *gige, struct job *job)
     for (int i = 0; wanted && i < 1 + job->exposure.fault.doubled; i++) {
         if (i > 0) {
             pthread_mutex_lock(&gige->lock);
-            job->block.id = job->camera->block = job->camera->block == UINT16_MAX ? 1 : (uint16_t)(job->camera->block + 1);
+            job->block.id = job->camera->block =
+                job->camera->block == UINT16_MAX ? 1 : (uint16_t)(job->camera->block + 1);
             wanted = keep(job);
             pthread_mutex_unlock(&gige->lock);
         }
