@@ -1,5 +1,6 @@
-/* The API: HTTP/JSON and server-sent events over the engine, described by daemon/http/openapi.yaml, which is served as
- * well. Runs in the thread of the GLib main loop that owns the engine. Errors are problem documents (RFC 9457). */
+/* The API: HTTP/JSON and server-sent events over the engine, described by daemon/http/openapi.json, which is served as
+ * well (/openapi.json; docs/api.md). Runs in the thread of the GLib main loop that owns the engine. Errors are problem
+ * documents (RFC 9457). */
 #ifndef LUMI_DAEMON_HTTP_API_SERVER_H
 #define LUMI_DAEMON_HTTP_API_SERVER_H
 
@@ -9,24 +10,29 @@
 struct lumi_http;
 struct lumi_http_options {
     const char *listen; /* "localhost:8470" by default: both loopback addresses; "ADDRESS:PORT", port 0: any */
-    const char *token;  /* needed for all but loopback addresses; NULL: loopback only, and without one */
-    const char *certificate, *key; /* PEM files; NULL: plain HTTP */
+    const char *token;  /* asked of everybody, and needed for all but loopback addresses; NULL: loopback, without one */
+    const char *certificate, *key; /* PEM files; NULL: plain HTTP. Both in one file where key is NULL */
+    const char *folder;            /* where captures are kept, for /api/v1/captures; may be NULL */
     size_t body_max;               /* of a request (1 MiB) */
     struct lumi_engine *engine;
     struct lumi_handover *handover; /* may be NULL */
     struct lumi_ingest *ingest;     /* may be NULL */
     int64_t (*now_ns)(void *context);
     /* Cameras that are on this host, also those no configuration names (lumi_camera_list), and boards
-     * (lumi_rig_usb_list); asked in a worker thread. May be NULL. */
+     * (lumi_rig_usb_list); asked in a worker thread. Returns how many there are. May be NULL: none. */
     int (*devices)(void *context, struct lumi_camera_identity *cameras, int max, struct lumi_error *error);
     void *context;
 };
 void lumi_http_options_init(struct lumi_http_options *options);
-/* LUMI_ERR_ARG: an address that is none, or not a loopback one without token. LUMI_ERR_BUSY: the port is taken. */
+/* LUMI_ERR_ARG: an address that is none, or not a loopback one without token. LUMI_ERR_BUSY: the port is taken.
+ * LUMI_ERR_FORMAT: certificate or key cannot be used. Strings are copied. */
 int lumi_http_start(const struct lumi_http_options *options, struct lumi_http **http, struct lumi_error *error);
 void lumi_http_stop(struct lumi_http *http);
 int lumi_http_port(const struct lumi_http *http);
-/* Passed on to who listens to /api/v1/events, and kept for those who come back (Last-Event-ID). */
+/* Passed on to who listens to /api/v1/events, and kept for those who come back (Last-Event-ID). They may be called by
+ * what the engine and the hand-over call: nobody is asked anything before the main loop comes round. NULL is fine. */
 void lumi_http_told(struct lumi_http *http, const struct lumi_engine_told *told);
+void lumi_http_processing(struct lumi_http *http, const struct lumi_process_status *status);
+void lumi_http_ingest(struct lumi_http *http, const struct lumi_ingest_status *status);
 
 #endif

@@ -6,7 +6,7 @@
  * brought to where they are. */
 #include "pipeline/exchange/exchange.h"
 
-#include "pipeline/exchange/json_check.h"
+#include "proto/base/json_check.h"
 
 #include <json-glib/json-glib.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* Other people's formats, read from memory and written back. */
 #include "pipeline/exchange/exchange.h"
-#include "pipeline/exchange/json_check.h"
+#include "proto/base/json_check.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,7 +1,6 @@
 /* A recogniser for RFC 8259 with a bounded stack: it says whether, not what. */
-#include "pipeline/exchange/json_check.h"
+#include "proto/base/json_check.h"
 
-#include <glib.h>
 #include <string.h>
 
 #define MAX_DEPTH 32
@@ -66,7 +65,8 @@ static bool take_code_unit(struct scan *scan, unsigned *unit)
     for (int i = 0; i < 4; i++, scan->at++) {
         if (scan->at >= scan->end || !is_hex(*scan->at))
             return false;
-        *unit = *unit << 4 | (unsigned)g_ascii_xdigit_value(*scan->at);
+        char c = *scan->at;
+        *unit = *unit << 4 | (unsigned)(is_digit(c) ? c - '0' : (c | 0x20) - 'a' + 10);
     }
     return true;
 }

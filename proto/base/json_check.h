@@ -1,6 +1,6 @@
 /* JSON, checked before it is parsed. */
-#ifndef LUMI_PIPELINE_EXCHANGE_JSON_CHECK_H
-#define LUMI_PIPELINE_EXCHANGE_JSON_CHECK_H
+#ifndef LUMI_PROTO_BASE_JSON_CHECK_H
+#define LUMI_PROTO_BASE_JSON_CHECK_H
 
 #include <stdbool.h>
 #include <stddef.h>

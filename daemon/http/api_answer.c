@@ -1,0 +1,68 @@
+/* Answers: JSON, and problem documents. */
+#include "daemon/http/api_priv.h"
+
+#include <string.h>
+
+void lumi_api_answer(SoupServerMessage *message, unsigned status, const char *type, char *text)
+{
+    SoupMessageHeaders *headers = soup_server_message_get_response_headers(message);
+
+    soup_message_headers_replace(headers, "Cache-Control", "no-store");
+    soup_message_headers_replace(headers, "X-Content-Type-Options", "nosniff");
+    soup_server_message_set_status(message, status, NULL);
+    soup_server_message_set_response(message, type, SOUP_MEMORY_TAKE, text, strlen(text));
+}
+
+void lumi_api_answer_json(SoupServerMessage *message, unsigned status, JsonBuilder *builder)
+{
+    lumi_api_answer(message, status, "application/json", lumi_api_finish(builder));
+}
+
+char *lumi_api_problem_text(unsigned status, const char *word, const char *detail)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+    g_autofree char *type = g_strconcat("urn:lumid:", word, NULL);
+
+    json_builder_begin_object(builder);
+    lumi_api_put_text(builder, "type", type);
+    lumi_api_put_text(builder, "title", soup_status_get_phrase(status));
+    lumi_api_put_int(builder, "status", status);
+    lumi_api_put_text(builder, "detail", detail);
+    json_builder_end_object(builder);
+    return lumi_api_finish(builder);
+}
+
+void lumi_api_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail)
+{
+    lumi_api_answer(message, status, "application/problem+json", lumi_api_problem_text(status, word, detail));
+}
+
+void lumi_api_problem_of(SoupServerMessage *message, int code, const char *text)
+{
+    static const struct {
+        int code;
+        unsigned status;
+        const char *word;
+    } table[] = {
+        {LUMI_ERR_NOMEM, 503, "nomem"},
+        {LUMI_ERR_IO, 500, "io"},
+        {LUMI_ERR_NOSPACE, 507, "nospace"},
+        {LUMI_ERR_BUSY, 409, "busy"},
+        {LUMI_ERR_CANCELLED, 409, "cancelled"},
+        {LUMI_ERR_ARG, 400, "argument"},
+        {LUMI_ERR_FORMAT, 422, "format"},
+        {LUMI_ERR_VERSION, 422, "version"},
+        {LUMI_ERR_UNSUPPORTED, 422, "unsupported"},
+        {LUMI_ERR_CHECKSUM, 422, "checksum"},
+        {LUMI_ERR_NOTFOUND, 404, "notfound"},
+        {LUMI_ERR_EXISTS, 409, "exists"},
+        {LUMI_ERR_LIMIT, 422, "limit"},
+    };
+
+    for (size_t i = 0; i < sizeof table / sizeof table[0]; i++)
+        if (table[i].code == code) {
+            lumi_api_problem(message, table[i].status, table[i].word, text);
+            return;
+        }
+    lumi_api_problem(message, 500, "internal", text);
+}

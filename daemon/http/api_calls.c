@@ -1,0 +1,270 @@
+/* What can be asked: the table of routes, and everything that is answered at once. */
+#include "daemon/http/api_priv.h"
+#include "daemon/http/api_report.h"
+
+#include <string.h>
+
+#define MISSING_MAX 4096
+#define LIST_MAX 256
+
+static void answer_capture(struct lumi_http *http, SoupServerMessage *message, unsigned status)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+
+    lumi_engine_status(http->options.engine, http->status);
+    json_builder_begin_object(builder);
+    lumi_api_capture(builder, http->status);
+    lumi_api_checks(builder, http->status);
+    json_builder_end_object(builder);
+    lumi_api_answer_json(message, status, builder);
+}
+
+/* What an operator wanted was taken (202: what comes of it is told by events), or not. */
+static void answer_wish(struct lumi_http *http, SoupServerMessage *message, int code, const struct lumi_error *error)
+{
+    if (code == LUMI_OK)
+        answer_capture(http, message, 202);
+    else
+        lumi_api_problem_of(message, code, error->text);
+}
+
+static int64_t now(struct lumi_http *http)
+{
+    return http->options.now_ns(http->options.context);
+}
+
+static void get_status(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+
+    (void)body;
+    lumi_engine_status(http->options.engine, http->status);
+    json_builder_begin_object(builder);
+    lumi_api_status(builder, http->status);
+    json_builder_end_object(builder);
+    lumi_api_answer_json(message, 200, builder);
+}
+
+static void get_capture(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    (void)body;
+    answer_capture(http, message, 200);
+}
+
+enum { START_PLAN, START_NAME, START_TITLE, START_OVERRIDE };
+static const struct lumi_api_field start_fields[] = {
+    {.name = "plan", .type = LUMI_API_STRING, .required = true, .max = LUMI_PLAN_TEXT_MAX},
+    {.name = "name", .type = LUMI_API_STRING, .max = LUMI_API_STRING_MAX},
+    {.name = "title", .type = LUMI_API_STRING, .max = LUMI_API_STRING_MAX},
+    {.name = "override", .type = LUMI_API_STRINGS, .max = LUMI_ENGINE_CHECKS},
+    {0},
+};
+
+static void start(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body, bool only)
+{
+    const char *plan = body->values[START_PLAN].string;
+    struct lumi_engine_start wanted = {
+        .name = body->values[START_NAME].string,
+        .title = body->values[START_TITLE].string,
+        .override = (const char *const *)body->values[START_OVERRIDE].strings,
+        .preflight_only = only,
+    };
+    struct lumi_error error;
+    int code = lumi_engine_start(http->options.engine, now(http), plan, strlen(plan), &wanted, &error);
+
+    answer_wish(http, message, code, &error);
+}
+
+static void post_start(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    start(http, message, body, false);
+}
+
+static void post_preflight(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    start(http, message, body, true);
+}
+
+static const struct lumi_api_field no_fields[] = {{0}};
+
+static void post_pause(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+
+    (void)body;
+    answer_wish(http, message, lumi_engine_pause(http->options.engine, now(http), &error), &error);
+}
+
+static void post_resume(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+
+    (void)body;
+    answer_wish(http, message, lumi_engine_resume(http->options.engine, now(http), &error), &error);
+}
+
+static const struct lumi_api_field stop_fields[] = {
+    {.name = "at_once", .type = LUMI_API_BOOL},
+    {.name = "seal", .type = LUMI_API_BOOL, .initially = true},
+    {0},
+};
+
+static void post_stop(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+    int code =
+        lumi_engine_stop(http->options.engine, now(http), body->values[0].boolean, body->values[1].boolean, &error);
+
+    answer_wish(http, message, code, &error);
+}
+
+static const struct lumi_api_field retake_fields[] = {
+    {.name = "capture", .type = LUMI_API_STRING, .max = 1023},
+    {.name = "frames", .type = LUMI_API_STRINGS, .max = LUMI_PLAN_SHOTS_MAX},
+    {0},
+};
+
+static void post_retake(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+    int code = lumi_engine_retake(http->options.engine, now(http), body->values[0].string,
+                                  (const char *const *)body->values[1].strings, &error);
+
+    answer_wish(http, message, code, &error);
+}
+
+static void post_clear(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+
+    (void)body;
+    answer_wish(http, message, lumi_engine_clear(http->options.engine, now(http), &error), &error);
+}
+
+static void post_emergency_stop(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    (void)body;
+    lumi_engine_emergency_stop(http->options.engine, now(http));
+    answer_capture(http, message, 202);
+}
+
+static void get_missing(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    g_autofree struct lumi_engine_missing *list = g_new0(struct lumi_engine_missing, MISSING_MAX);
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+    int count = lumi_engine_missing(http->options.engine, list, MISSING_MAX);
+
+    (void)body;
+    json_builder_begin_object(builder);
+    lumi_api_put_int(builder, "count", count);
+    lumi_api_put_array(builder, "missing");
+    for (int i = 0; i < count && i < MISSING_MAX; i++) {
+        json_builder_begin_object(builder);
+        lumi_api_missing(builder, &list[i]);
+        json_builder_end_object(builder);
+    }
+    json_builder_end_array(builder);
+    json_builder_end_object(builder);
+    lumi_api_answer_json(message, 200, builder);
+}
+
+static void get_processing(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    g_autofree struct lumi_process_status *list = g_new0(struct lumi_process_status, LIST_MAX);
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+    int count = http->options.handover ? lumi_handover_list(http->options.handover, list, LIST_MAX) : 0;
+
+    (void)body;
+    json_builder_begin_object(builder);
+    lumi_api_put_bool(builder, "configured", http->options.handover != NULL);
+    lumi_api_put_array(builder, "processing");
+    for (int i = 0; i < count && i < LIST_MAX; i++) {
+        json_builder_begin_object(builder);
+        lumi_api_processing(builder, &list[i]);
+        json_builder_end_object(builder);
+    }
+    json_builder_end_array(builder);
+    json_builder_end_object(builder);
+    lumi_api_answer_json(message, 200, builder);
+}
+
+static const struct lumi_api_field process_fields[] = {
+    {.name = "capture", .type = LUMI_API_STRING, .required = true, .max = 1023},
+    {.name = "again", .type = LUMI_API_BOOL},
+    {0},
+};
+
+static void post_processing(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+    int code;
+
+    if (!http->options.handover) {
+        lumi_api_problem(message, 409, "busy", "the configuration names no processing command");
+        return;
+    }
+    code = lumi_handover_give(http->options.handover, body->values[0].string, body->values[1].boolean, &error);
+    if (code != LUMI_OK)
+        lumi_api_problem_of(message, code, error.text);
+    else {
+        get_processing(http, message, body);
+        soup_server_message_set_status(message, 202, NULL);
+    }
+}
+
+static void get_ingest(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    g_autofree struct lumi_ingest_status *list = g_new0(struct lumi_ingest_status, LIST_MAX);
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+    int count = http->options.ingest ? lumi_ingest_list(http->options.ingest, list, LIST_MAX) : 0;
+
+    (void)body;
+    json_builder_begin_object(builder);
+    lumi_api_put_bool(builder, "configured", http->options.ingest != NULL);
+    lumi_api_put_array(builder, "ingest");
+    for (int i = 0; i < count && i < LIST_MAX; i++) {
+        json_builder_begin_object(builder);
+        lumi_api_ingest(builder, &list[i]);
+        json_builder_end_object(builder);
+    }
+    json_builder_end_array(builder);
+    json_builder_end_object(builder);
+    lumi_api_answer_json(message, 200, builder);
+}
+
+static void get_metrics(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    (void)body;
+    lumi_engine_status(http->options.engine, http->status);
+    lumi_api_answer(message, 200, "text/plain; version=0.0.4; charset=utf-8", lumi_api_metrics(http->status));
+}
+
+static void get_openapi(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    (void)http;
+    (void)body;
+    lumi_api_answer(message, 200, "application/json", g_strdup(lumi_api_openapi));
+}
+
+const struct lumi_api_route lumi_api_routes[] = {
+    {"/api/v1/status", "GET", NULL, get_status},
+    {"/api/v1/devices", "GET", NULL, lumi_api_get_devices},
+    {"/api/v1/capture", "GET", NULL, get_capture},
+    {"/api/v1/capture/preflight", "POST", start_fields, post_preflight},
+    {"/api/v1/capture/start", "POST", start_fields, post_start},
+    {"/api/v1/capture/pause", "POST", no_fields, post_pause},
+    {"/api/v1/capture/resume", "POST", no_fields, post_resume},
+    {"/api/v1/capture/stop", "POST", stop_fields, post_stop},
+    {"/api/v1/capture/retake", "POST", retake_fields, post_retake},
+    {"/api/v1/capture/clear", "POST", no_fields, post_clear},
+    {"/api/v1/capture/emergency-stop", "POST", no_fields, post_emergency_stop},
+    {"/api/v1/captures", "GET", NULL, lumi_api_get_captures},
+    {"/api/v1/missing", "GET", NULL, get_missing},
+    {"/api/v1/processing", "GET", NULL, get_processing},
+    {"/api/v1/processing", "POST", process_fields, post_processing},
+    {"/api/v1/ingest", "GET", NULL, get_ingest},
+    {"/api/v1/events", "GET", NULL, lumi_api_get_events},
+    {"/metrics", "GET", NULL, get_metrics},
+    {"/openapi.json", "GET", NULL, get_openapi},
+    {0},
+};

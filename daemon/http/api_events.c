@@ -1,0 +1,352 @@
+/* Server-sent events (HTML Living Standard, 9.2). Every event is kept once, in a ring; who listens has a place in it
+ * and at most one block on its way, so that a client that does not read costs nothing however long it sleeps: it is
+ * told how many it missed ("gap"), and hung up on when it takes nothing for a minute.
+ *
+ * An event's id is "EPOCH-NUMBER". The epoch is another for every start of the program: who comes back with one of an
+ * earlier start gets all that is kept. "progress" (a Capture) has no id: only the newest is worth having. */
+#include "daemon/http/api_priv.h"
+#include "daemon/http/api_report.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#define RING 2048
+#define LISTENERS 32
+#define BLOCK_BYTES 32768
+#define TICK_MS 500
+#define PING_NS (15 * 1000000000LL)
+#define PATIENCE_NS (60 * 1000000000LL)
+
+struct event {
+    uint64_t number;
+    const char *kind;
+    char *data; /* one line of JSON */
+};
+
+struct listener {
+    struct lumi_api_events *events;
+    SoupServerMessage *message;
+    uint64_t next;      /* number of the event it gets next */
+    uint64_t progress;  /* the progress it has seen */
+    bool busy;          /* a block is on its way */
+    int64_t written_ns; /* when the last one was */
+};
+
+struct lumi_api_events {
+    struct lumi_http *http;
+    uint32_t epoch;
+    struct event ring[RING];
+    uint64_t first, next; /* numbers of the oldest that is kept, of the next there will be */
+    GArray *told;         /* struct lumi_engine_told: not in the ring yet */
+    GPtrArray *listeners;
+    char *progress;
+    uint64_t progress_number;
+    guint idle, tick;
+};
+
+/* ---- the ring ---- */
+
+static void keep(struct lumi_api_events *events, const char *kind, char *data)
+{
+    struct event *event = &events->ring[events->next % RING];
+
+    g_free(event->data);
+    *event = (struct event){.number = events->next, .kind = kind, .data = data};
+    events->next++;
+    if (events->next - events->first > RING)
+        events->first = events->next - RING;
+}
+
+static const char *kind_name(enum lumi_engine_tale kind)
+{
+    static const char *const names[] = {"state", "check", "shot", "frame", "incident", "sealed"};
+
+    return (unsigned)kind < 6 ? names[kind] : "incident";
+}
+
+static void describe(JsonBuilder *builder, const struct lumi_engine_told *told, const struct lumi_engine_status *status)
+{
+    lumi_api_put_time(builder, "time", told->unix_us);
+    if (told->kind == LUMI_TALE_STATE)
+        lumi_api_put_text(builder, "state", lumi_engine_state_name(status->state));
+    if (told->kind == LUMI_TALE_CHECK && told->check >= 0 && told->check < status->check_count)
+        lumi_api_check(builder, &status->checks[told->check]);
+    if (told->kind == LUMI_TALE_SHOT || told->kind == LUMI_TALE_FRAME)
+        lumi_api_put_int(builder, "shot", told->shot);
+    if (told->kind == LUMI_TALE_SHOT)
+        lumi_api_put_bool(builder, "lost", told->lost);
+    if ((told->kind == LUMI_TALE_FRAME || told->kind == LUMI_TALE_INCIDENT) && told->camera >= 0 &&
+        told->camera < status->camera_count)
+        lumi_api_put_text(builder, "camera", status->cameras[told->camera].name);
+    if (told->kind == LUMI_TALE_FRAME)
+        lumi_api_put_text(builder, "state", lumi_frame_state_name(told->frame_state));
+    if (told->kind != LUMI_TALE_SHOT && told->kind != LUMI_TALE_CHECK)
+        lumi_api_put_text(builder, "text", told->text);
+}
+
+/* The engine must not be asked while it tells; so what it told becomes events a moment later. */
+static void take_told(struct lumi_api_events *events)
+{
+    g_autoptr(JsonBuilder) builder = NULL;
+
+    if (!events->told->len)
+        return;
+    builder = json_builder_new();
+    lumi_engine_status(events->http->options.engine, events->http->status);
+    for (guint i = 0; i < events->told->len; i++) {
+        const struct lumi_engine_told *told = &g_array_index(events->told, struct lumi_engine_told, i);
+        json_builder_begin_object(builder);
+        describe(builder, told, events->http->status);
+        json_builder_end_object(builder);
+        keep(events, kind_name(told->kind), lumi_api_finish(builder));
+    }
+    g_array_set_size(events->told, 0);
+}
+
+/* ---- listeners ---- */
+
+static void put_event(GString *block, const char *kind, const char *data)
+{
+    g_string_append_printf(block, "event: %s\ndata: %s\n\n", kind, data);
+}
+
+static void send_block(struct listener *listener, GString *block)
+{
+    SoupMessageBody *body = soup_server_message_get_response_body(listener->message);
+    GBytes *bytes = g_string_free_to_bytes(block);
+
+    soup_message_body_append_bytes(body, bytes);
+    g_bytes_unref(bytes);
+    listener->busy = true;
+    soup_server_message_unpause(listener->message);
+}
+
+/* The next block for somebody who has taken the last one. */
+static void pump(struct listener *listener)
+{
+    struct lumi_api_events *events = listener->events;
+    GString *block;
+
+    if (listener->busy)
+        return;
+    block = g_string_new(NULL);
+    if (listener->next < events->first) {
+        g_string_append_printf(block, "event: gap\ndata: {\"lost\":%" PRIu64 "}\n\n", events->first - listener->next);
+        listener->next = events->first;
+    }
+    for (; listener->next < events->next && block->len < BLOCK_BYTES; listener->next++) {
+        const struct event *event = &events->ring[listener->next % RING];
+        g_string_append_printf(block, "id: %" PRIx32 "-%" PRIu64 "\n", events->epoch, event->number);
+        put_event(block, event->kind, event->data);
+    }
+    if (listener->next == events->next && events->progress && listener->progress != events->progress_number) {
+        put_event(block, "progress", events->progress);
+        listener->progress = events->progress_number;
+    }
+    if (!block->len && events->http->options.now_ns(events->http->options.context) - listener->written_ns > PING_NS)
+        g_string_append(block, ": here\n\n");
+    if (block->len)
+        send_block(listener, block);
+    else
+        g_string_free(block, TRUE);
+}
+
+static void pump_all(struct lumi_api_events *events)
+{
+    for (guint i = 0; i < events->listeners->len; i++)
+        pump(events->listeners->pdata[i]);
+}
+
+static gboolean on_idle(void *context)
+{
+    struct lumi_api_events *events = context;
+
+    events->idle = 0;
+    take_told(events);
+    pump_all(events);
+    return G_SOURCE_REMOVE;
+}
+
+static void wake(struct lumi_api_events *events)
+{
+    if (!events->idle)
+        events->idle = g_idle_add_full(G_PRIORITY_DEFAULT, on_idle, events, NULL);
+}
+
+static void see_progress(struct lumi_api_events *events)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+
+    lumi_engine_status(events->http->options.engine, events->http->status);
+    json_builder_begin_object(builder);
+    lumi_api_capture(builder, events->http->status);
+    json_builder_end_object(builder);
+    g_autofree char *text = lumi_api_finish(builder);
+    if (g_strcmp0(text, events->progress)) {
+        g_free(events->progress);
+        events->progress = g_steal_pointer(&text);
+        events->progress_number++;
+    }
+}
+
+static gboolean on_tick(void *context)
+{
+    struct lumi_api_events *events = context;
+    int64_t now = events->http->options.now_ns(events->http->options.context);
+
+    if (!events->listeners->len) {
+        events->tick = 0;
+        return G_SOURCE_REMOVE;
+    }
+    take_told(events);
+    see_progress(events);
+    for (guint i = 0; i < events->listeners->len; i++) {
+        struct listener *listener = events->listeners->pdata[i];
+        GSocket *socket = soup_server_message_get_socket(listener->message);
+        if (listener->busy && now - listener->written_ns > PATIENCE_NS && socket)
+            g_socket_shutdown(socket, TRUE, TRUE, NULL); /* the write fails, and the message is finished */
+    }
+    pump_all(events);
+    return G_SOURCE_CONTINUE;
+}
+
+static void on_wrote_chunk(SoupServerMessage *message, void *context)
+{
+    struct listener *listener = context;
+
+    (void)message;
+    listener->busy = false;
+    listener->written_ns = listener->events->http->options.now_ns(listener->events->http->options.context);
+    pump(listener);
+}
+
+static void on_finished(SoupServerMessage *message, void *context)
+{
+    struct listener *listener = context;
+
+    g_signal_handlers_disconnect_by_data(message, listener);
+    g_ptr_array_remove_fast(listener->events->listeners, listener);
+}
+
+static void free_listener(void *data)
+{
+    struct listener *listener = data;
+
+    g_object_unref(listener->message);
+    g_free(listener);
+}
+
+static uint64_t where_to_begin(const struct lumi_api_events *events, SoupServerMessage *message)
+{
+    SoupMessageHeaders *headers = soup_server_message_get_request_headers(message);
+    const char *text = soup_message_headers_get_one(headers, "Last-Event-ID");
+    uint64_t number;
+    uint32_t epoch;
+
+    if (!text)
+        return events->next;
+    if (!lumi_api_event_id_parse(text, &epoch, &number) || epoch != events->epoch || number >= events->next)
+        return events->first;
+    return number + 1;
+}
+
+void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    struct lumi_api_events *events = http->events;
+    SoupMessageHeaders *headers = soup_server_message_get_response_headers(message);
+    struct listener *listener;
+
+    (void)body;
+    if (events->listeners->len >= LISTENERS) {
+        lumi_api_problem(message, 503, "limit", "too many listen to the events already");
+        return;
+    }
+    take_told(events);
+    see_progress(events);
+    listener = g_new0(struct listener, 1);
+    listener->events = events;
+    listener->message = g_object_ref(message);
+    listener->next = where_to_begin(events, message);
+    listener->written_ns = http->options.now_ns(http->options.context);
+    soup_server_message_set_status(message, 200, NULL);
+    soup_message_headers_set_content_type(headers, "text/event-stream", NULL);
+    soup_message_headers_replace(headers, "Cache-Control", "no-store");
+    soup_message_headers_replace(headers, "X-Content-Type-Options", "nosniff");
+    soup_message_headers_set_encoding(headers, SOUP_ENCODING_CHUNKED);
+    soup_message_body_set_accumulate(soup_server_message_get_response_body(message), FALSE);
+    g_signal_connect(message, "wrote-chunk", G_CALLBACK(on_wrote_chunk), listener);
+    g_signal_connect(message, "finished", G_CALLBACK(on_finished), listener);
+    g_ptr_array_add(events->listeners, listener);
+    send_block(listener, g_string_new("retry: 2000\n\n"));
+    if (!events->tick)
+        events->tick = g_timeout_add(TICK_MS, on_tick, events);
+}
+
+/* ---- life ---- */
+
+int lumi_api_events_create(struct lumi_http *http, struct lumi_api_events **events, struct lumi_error *error)
+{
+    struct lumi_api_events *made = g_new0(struct lumi_api_events, 1);
+
+    (void)error;
+    made->http = http;
+    made->epoch = g_random_int();
+    made->first = made->next = 1;
+    made->told = g_array_new(FALSE, FALSE, sizeof(struct lumi_engine_told));
+    made->listeners = g_ptr_array_new_with_free_func(free_listener);
+    *events = made;
+    return LUMI_OK;
+}
+
+void lumi_api_events_destroy(struct lumi_api_events *events)
+{
+    if (!events)
+        return;
+    if (events->idle)
+        g_source_remove(events->idle);
+    if (events->tick)
+        g_source_remove(events->tick);
+    for (guint i = 0; i < events->listeners->len; i++) {
+        struct listener *listener = events->listeners->pdata[i];
+        g_signal_handlers_disconnect_by_data(listener->message, listener);
+    }
+    g_ptr_array_unref(events->listeners);
+    g_array_unref(events->told);
+    for (int i = 0; i < RING; i++)
+        g_free(events->ring[i].data);
+    g_free(events->progress);
+    g_free(events);
+}
+
+void lumi_api_events_told(struct lumi_api_events *events, const struct lumi_engine_told *told)
+{
+    if (events->told->len >= RING) { /* the main loop has not come round for long: the oldest is lost, and counted */
+        g_array_remove_index(events->told, 0);
+        events->next++;
+        events->first = events->next;
+    }
+    g_array_append_val(events->told, *told);
+    wake(events);
+}
+
+void lumi_api_events_processing(struct lumi_api_events *events, const struct lumi_process_status *status)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+
+    json_builder_begin_object(builder);
+    lumi_api_processing(builder, status);
+    json_builder_end_object(builder);
+    keep(events, "processing", lumi_api_finish(builder));
+    wake(events);
+}
+
+void lumi_api_events_ingest(struct lumi_api_events *events, const struct lumi_ingest_status *status)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+
+    json_builder_begin_object(builder);
+    lumi_api_ingest(builder, status);
+    json_builder_end_object(builder);
+    keep(events, "ingest", lumi_api_finish(builder));
+    wake(events);
+}

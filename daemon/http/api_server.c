@@ -1,0 +1,252 @@
+/* The API's server: who may ask, what is asked for, and life.
+ *
+ * A service on localhost is within reach of every page that a browser on this computer shows. So, where no token is
+ * asked for: the Host header must name this computer (a foreign name that was made to lead to 127.0.0.1 does not), and
+ * always: a request that says it comes from another origin is refused, and a body must be JSON by its type, which no
+ * form can send. */
+#include "daemon/http/api_priv.h"
+
+#include <string.h>
+
+#define BODY_MAX (1 << 20)
+
+void lumi_http_options_init(struct lumi_http_options *options)
+{
+    memset(options, 0, sizeof *options);
+    options->listen = "localhost:8470";
+    options->body_max = BODY_MAX;
+}
+
+/* ---- who may ask ---- */
+
+/* True: it is answered already. */
+static bool refused(struct lumi_http *http, SoupServerMessage *message)
+{
+    SoupMessageHeaders *headers = soup_server_message_get_request_headers(message);
+    const char *host = soup_message_headers_get_one(headers, "Host");
+    const char *origin = soup_message_headers_get_one(headers, "Origin");
+    const char *site = soup_message_headers_get_one(headers, "Sec-Fetch-Site");
+
+    if (!http->options.token && !lumi_api_host_is_local(host)) {
+        lumi_api_problem(message, 421, "host", "this server answers to localhost, 127.0.0.1 and [::1] only");
+        return true;
+    }
+    if ((origin && !lumi_api_origin_is_own(origin, http->https ? "https" : "http", host)) ||
+        (site && strcmp(site, "same-origin") && strcmp(site, "none"))) {
+        lumi_api_problem(message, 403, "origin", "requests of other sites' pages are not answered");
+        return true;
+    }
+    if (http->options.token &&
+        !lumi_api_token_matches(soup_message_headers_get_one(headers, "Authorization"), http->options.token)) {
+        soup_message_headers_replace(soup_server_message_get_response_headers(message), "WWW-Authenticate",
+                                     "Bearer realm=\"lumid\"");
+        lumi_api_problem(message, 401, "token", "the token is missing or wrong (Authorization: Bearer TOKEN)");
+        return true;
+    }
+    return false;
+}
+
+/* When the headers are here and nothing of the body is. */
+static void on_early(SoupServer *server, SoupServerMessage *message, const char *path, GHashTable *query, void *context)
+{
+    struct lumi_http *http = context;
+    SoupMessageHeaders *headers = soup_server_message_get_request_headers(message);
+    goffset length = soup_message_headers_get_content_length(headers);
+    g_autofree char *text = NULL;
+
+    (void)server;
+    (void)path;
+    (void)query;
+    if (soup_message_headers_get_encoding(headers) == SOUP_ENCODING_CHUNKED)
+        lumi_api_refuse_early(message, 411, "length", "a body must say how long it is (Content-Length)");
+    else if (length > 0 && (size_t)length > http->options.body_max) {
+        text =
+            g_strdup_printf("a body of %" G_GOFFSET_FORMAT " bytes; %zu are the most", length, http->options.body_max);
+        lumi_api_refuse_early(message, 413, "limit", text);
+    }
+}
+
+/* ---- what is asked for ---- */
+
+static void answer_no_method(SoupServerMessage *message, const char *path)
+{
+    g_autoptr(GString) allowed = g_string_new(NULL);
+
+    for (int i = 0; lumi_api_routes[i].path; i++)
+        if (!strcmp(lumi_api_routes[i].path, path))
+            g_string_append_printf(allowed, "%s%s", allowed->len ? ", " : "", lumi_api_routes[i].method);
+    g_autofree char *detail = g_strdup_printf("here: %s", allowed->str);
+    soup_message_headers_replace(soup_server_message_get_response_headers(message), "Allow", allowed->str);
+    lumi_api_problem(message, 405, "method", detail);
+}
+
+static void call(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_route *route)
+{
+    const char *type = soup_message_headers_get_content_type(soup_server_message_get_request_headers(message), NULL);
+    struct lumi_api_body body = {0};
+    struct lumi_error error;
+    GBytes *bytes;
+    size_t size;
+    int code = LUMI_OK;
+
+    if (route->fields) {
+        bytes = soup_message_body_flatten(soup_server_message_get_request_body(message));
+        const char *text = g_bytes_get_data(bytes, &size);
+        if (size && g_strcmp0(type, "application/json"))
+            lumi_api_problem(message, 415, "type", "a body must be JSON (Content-Type: application/json)");
+        else if ((code = lumi_api_body_parse(text, size, route->fields, &body, &error)) != LUMI_OK)
+            lumi_api_problem_of(message, code, error.text);
+        else
+            route->call(http, message, &body);
+        g_bytes_unref(bytes);
+        lumi_api_body_clear(&body);
+    } else
+        route->call(http, message, &body);
+}
+
+static void on_request(SoupServer *server, SoupServerMessage *message, const char *path, GHashTable *query,
+                       void *context)
+{
+    struct lumi_http *http = context;
+    const char *method = soup_server_message_get_method(message);
+    bool known = false;
+
+    (void)server;
+    (void)query;
+    if (refused(http, message))
+        return;
+    for (int i = 0; lumi_api_routes[i].path; i++) {
+        if (strcmp(lumi_api_routes[i].path, path))
+            continue;
+        known = true;
+        if (!strcmp(lumi_api_routes[i].method, method)) {
+            call(http, message, &lumi_api_routes[i]);
+            return;
+        }
+    }
+    if (known)
+        answer_no_method(message, path);
+    else
+        lumi_api_problem(message, 404, "path", "there is nothing here; /openapi.json says what there is");
+}
+
+/* ---- life ---- */
+
+static int load_certificate(struct lumi_http *http, struct lumi_error *error)
+{
+    const char *certificate = http->options.certificate;
+    const char *key = http->options.key ? http->options.key : certificate;
+    g_autoptr(GError) failed = NULL;
+
+    if (!certificate)
+        return http->options.key ? lumi_fail(error, LUMI_ERR_ARG, "HTTP: a key without a certificate") : LUMI_OK;
+    if (!g_tls_backend_supports_tls(g_tls_backend_get_default()))
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "HTTP: no TLS on this computer: install glib-networking");
+    g_autoptr(GTlsCertificate) loaded = g_tls_certificate_new_from_files(certificate, key, &failed);
+    if (!loaded)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "HTTP: certificate %s, key %s: %s", certificate, key, failed->message);
+    soup_server_set_tls_certificate(http->server, loaded);
+    http->https = true;
+    return LUMI_OK;
+}
+
+static int listen_at(struct lumi_http *http, struct lumi_error *error)
+{
+    SoupServerListenOptions how = http->https ? SOUP_SERVER_LISTEN_HTTPS : 0;
+    struct lumi_api_listen listen;
+    g_autoptr(GError) failed = NULL;
+    bool good;
+
+    LUMI_TRY(lumi_api_listen_parse(http->options.listen, &listen, error));
+    if (!listen.loopback && !http->options.token)
+        return lumi_fail(error, LUMI_ERR_ARG, "listen on '%s': others can reach this address, so a token is needed",
+                         http->options.listen);
+    if (!strcmp(listen.host, "localhost"))
+        good = soup_server_listen_local(http->server, (guint)listen.port, how, &failed);
+    else if (!strcmp(listen.host, "*"))
+        good = soup_server_listen_all(http->server, (guint)listen.port, how, &failed);
+    else {
+        g_autoptr(GSocketAddress) address = g_inet_socket_address_new_from_string(listen.host, (guint)listen.port);
+        good = soup_server_listen(http->server, address, how, &failed);
+    }
+    if (!good)
+        return lumi_fail(error,
+                         g_error_matches(failed, G_IO_ERROR, G_IO_ERROR_ADDRESS_IN_USE) ? LUMI_ERR_BUSY : LUMI_ERR_IO,
+                         "listen on '%s': %s", http->options.listen, failed->message);
+    GSList *uris = soup_server_get_uris(http->server);
+    if (uris)
+        http->port = g_uri_get_port(uris->data);
+    g_slist_free_full(uris, (GDestroyNotify)g_uri_unref);
+    return LUMI_OK;
+}
+
+static void copy_options(struct lumi_http *http, const struct lumi_http_options *options)
+{
+    http->options = *options;
+    http->options.listen = g_strdup(options->listen);
+    http->options.token = options->token && *options->token ? g_strdup(options->token) : NULL;
+    http->options.certificate = g_strdup(options->certificate);
+    http->options.key = g_strdup(options->key);
+    http->options.folder = g_strdup(options->folder);
+}
+
+int lumi_http_start(const struct lumi_http_options *options, struct lumi_http **http, struct lumi_error *error)
+{
+    struct lumi_http *made = g_new0(struct lumi_http, 1);
+    int code;
+
+    copy_options(made, options);
+    made->status = g_new0(struct lumi_engine_status, 1);
+    made->server = soup_server_new("server-header", "lumid", "raw-paths", TRUE, NULL);
+    LUMI_GOTO(code, out, load_certificate(made, error));
+    LUMI_GOTO(code, out, lumi_api_worker_create(&made->worker, error));
+    LUMI_GOTO(code, out, lumi_api_events_create(made, &made->events, error));
+    soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
+    soup_server_add_handler(made->server, NULL, on_request, made, NULL);
+    LUMI_GOTO(code, out, listen_at(made, error));
+    *http = made;
+    made = NULL;
+out:
+    lumi_http_stop(made);
+    return code;
+}
+
+void lumi_http_stop(struct lumi_http *http)
+{
+    if (!http)
+        return;
+    lumi_api_worker_destroy(http->worker);
+    lumi_api_events_destroy(http->events);
+    soup_server_disconnect(http->server);
+    g_object_unref(http->server);
+    g_free(http->status);
+    g_free((char *)http->options.listen);
+    g_free((char *)http->options.token);
+    g_free((char *)http->options.certificate);
+    g_free((char *)http->options.key);
+    g_free((char *)http->options.folder);
+    g_free(http);
+}
+
+int lumi_http_port(const struct lumi_http *http)
+{
+    return http->port;
+}
+
+void lumi_http_told(struct lumi_http *http, const struct lumi_engine_told *told)
+{
+    if (http)
+        lumi_api_events_told(http->events, told);
+}
+
+void lumi_http_processing(struct lumi_http *http, const struct lumi_process_status *status)
+{
+    if (http)
+        lumi_api_events_processing(http->events, status);
+}
+
+void lumi_http_ingest(struct lumi_http *http, const struct lumi_ingest_status *status)
+{
+    if (http)
+        lumi_api_events_ingest(http->events, status);
+}
