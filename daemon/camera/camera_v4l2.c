@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #define LISTED_MAX 64
-#define FORMATS_MAX 64
+#define FORMATS_MAX 256
 
 int v4l2_ioctl(int fd, unsigned long request, void *argument)
 {
@@ -197,12 +197,14 @@ static int configure(struct lumi_camera *base, const struct lumi_camera_setting 
 {
     struct v4l2_camera *camera = (struct v4l2_camera *)base;
     const struct v4l2_pixel *pixel;
+    uint32_t asked;
 
     LUMI_TRY(v4l2_stream_stop(camera, error));
     camera->pixel = NULL;
     if (setting->frame_rate < 0 || setting->frame_rate > 1e6 || setting->buffers < 0 || setting->buffers > 30)
         return lumi_fail(error, LUMI_ERR_ARG, "%s: %g frames a second into %d buffers", base->identity.address,
                          setting->frame_rate, setting->buffers);
+    LUMI_TRY(v4l2_pixel_option(setting, &asked, error));
     pixel = choose_pixel(camera, setting, error);
     if (!pixel)
         return LUMI_ERR_UNSUPPORTED;

@@ -288,6 +288,8 @@ static int apply_option(struct v4l2_camera *camera, const struct camera_option *
     const double value = strtod(option->value, &end);
     const bool number = end != option->value && *end == '\0' && isfinite(value);
 
+    if (strcmp(option->name, V4L2_OPTION_FORMAT) == 0)
+        return LUMI_OK; /* done with when the format was chosen */
     if (!number || value < -2147483648.0 || value > 2147483647.0)
         return lumi_fail(error, LUMI_ERR_ARG, "%s: option %s=%s: a number is needed", camera->camera.identity.address,
                          option->name, option->value);

@@ -41,9 +41,30 @@ const struct v4l2_pixel *v4l2_pixel_find(uint32_t fourcc)
     return NULL;
 }
 
-static bool fits(const struct v4l2_pixel *pixel, const struct lumi_camera_setting *setting)
+int v4l2_pixel_option(const struct lumi_camera_setting *setting, uint32_t *fourcc, struct lumi_error *error)
 {
-    return (setting->layout == LUMI_LAYOUT_NONE || setting->layout == pixel->layout) &&
+    const char *text = setting->options;
+    struct camera_option option;
+    int more;
+
+    *fourcc = 0;
+    while ((more = camera_option_next(&text, &option, error)) > 0) {
+        const size_t length = strlen(option.value);
+
+        if (strcmp(option.name, V4L2_OPTION_FORMAT) != 0)
+            continue;
+        for (size_t i = 0; i < 4; i++)
+            *fourcc |= (uint32_t)(unsigned char)(i < length ? option.value[i] : ' ') << (8 * i);
+        if (length > 4 || !v4l2_pixel_find(*fourcc))
+            return lumi_fail(error, LUMI_ERR_ARG, "option %s=%s: not a format of ours", option.name, option.value);
+    }
+    return more;
+}
+
+static bool fits(const struct v4l2_pixel *pixel, const struct lumi_camera_setting *setting, uint32_t fourcc)
+{
+    return (fourcc == 0 || fourcc == pixel->fourcc) &&
+           (setting->layout == LUMI_LAYOUT_NONE || setting->layout == pixel->layout) &&
            (setting->bits == 0 || setting->bits == pixel->bits) &&
            (!setting->dmabuf || (pixel->planes == 1 && !pixel->packed));
 }
@@ -52,10 +73,14 @@ const struct v4l2_pixel *v4l2_pixel_choose(const uint32_t *fourccs, int count,
                                            const struct lumi_camera_setting *setting, struct lumi_error *error)
 {
     char there[256] = "";
+    uint32_t fourcc;
+
+    if (v4l2_pixel_option(setting, &fourcc, error) != LUMI_OK)
+        return NULL;
 
     for (int i = 0; i < PIXELS; i++)
         for (int k = 0; k < count; k++)
-            if (fourccs[k] == pixels[i].fourcc && fits(&pixels[i], setting))
+            if (fourccs[k] == pixels[i].fourcc && fits(&pixels[i], setting, fourcc))
                 return &pixels[i];
     for (int k = 0; k < count && strlen(there) + 6 < sizeof there; k++) {
         const uint32_t f = fourccs[k];

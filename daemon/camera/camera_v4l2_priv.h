@@ -17,6 +17,9 @@ struct v4l2_pixel {
     bool packed; /* MIPI CSI-2's packing, unpacked to words as it is copied */
 };
 const struct v4l2_pixel *v4l2_pixel_find(uint32_t fourcc); /* NULL: not of ours */
+/* What the option PixelFormat=NM12 asks for; 0: nothing. */
+#define V4L2_OPTION_FORMAT "PixelFormat"
+int v4l2_pixel_option(const struct lumi_camera_setting *setting, uint32_t *fourcc, struct lumi_error *error);
 /* Which of the device's formats a setting wants; NULL: none, with what there is in `error`. Zero-copy frames lie in one
  * plane and are not unpacked. */
 const struct v4l2_pixel *v4l2_pixel_choose(const uint32_t *fourccs, int count,
