@@ -109,8 +109,8 @@ static void finish(struct lumi_store *store, struct store_entry *entry)
     store->jobs--;
     store->stored_bytes += (int64_t)done->bytes;
     count_second(store, now, (int64_t)done->bytes, done->seconds);
-    if (entry->job.kind == LUMI_STORE_SEAL && entry->code == LUMI_OK)
-        store->sealed = true;
+    if (store->copy && entry->code == LUMI_OK && entry->file[0])
+        store_copy_add(store->copy, entry->file, entry->sha256, entry->written);
     entry->next = NULL;
     *store->done_last = entry;
     store->done_last = &entry->next;
@@ -140,10 +140,27 @@ static void *run_writer(void *context)
         store_write(store, entry);
         pthread_mutex_lock(&store->lock);
         entry->stage = STORE_READY;
+        if (--store->unwritten == 0 && store->copy)
+            store_copy_wake(store->copy);
         pthread_cond_signal(&store->to_commit);
     }
     pthread_mutex_unlock(&store->lock);
     return NULL;
+}
+
+/* A seal is done when the second copy is, or is given up; which of them its text tells. */
+static void sealed(struct lumi_store *store, struct store_entry *entry)
+{
+    char text[256];
+    int64_t behind;
+    int code;
+
+    store->sealed = true;
+    if (!store->copy)
+        return;
+    store_copy_finish(store->copy);
+    store_copy_tell(store->copy, &behind, &code, text, sizeof text);
+    snprintf(entry->text, sizeof entry->text, code == LUMI_OK ? "second copy: %s" : "no second copy: %s", text);
 }
 
 /* Commits one group. False: there was none. Called and returns with the lock. */
@@ -159,6 +176,8 @@ static bool commit_ready(struct lumi_store *store, int most)
     store_commit(store, group, count);
     pthread_mutex_lock(&store->lock);
     store->committing = 0;
+    if (group[0]->job.kind == LUMI_STORE_SEAL && group[0]->code == LUMI_OK)
+        sealed(store, group[0]);
     for (int i = 0; i < count; i++)
         finish(store, group[i]);
     return true;
@@ -186,10 +205,12 @@ static void *run_committer(void *context)
 
 static int start_threads(struct lumi_store *store, struct lumi_error *error)
 {
-    int wanted = store->options.writers > 0 ? store->options.writers : lumi_thread_count() + 2;
+    int wanted = store->options.writers > 0 ? store->options.writers : 2 * lumi_thread_count();
 
     if (wanted > STORE_WRITERS)
         wanted = STORE_WRITERS;
+    if (store->options.writers <= 0 && wanted < 4)
+        wanted = 4; /* a disk wants several requests at once */
     if (pthread_create(&store->committer, NULL, run_committer, store) != 0)
         return lumi_fail(error, LUMI_ERR_NOMEM, "store: no thread can be started");
     store->has_committer = true;
@@ -224,7 +245,6 @@ static void release(struct lumi_store *store)
     pthread_cond_destroy(&store->to_commit);
     pthread_cond_destroy(&store->to_write);
     pthread_mutex_destroy(&store->lock);
-    lumi_free(store->second_copy);
     lumi_free(store);
 }
 
@@ -244,13 +264,17 @@ int lumi_store_open(struct lumi_capture *capture, const struct lumi_store_option
     pthread_mutex_init(&made->lock, NULL);
     pthread_cond_init(&made->to_write, NULL);
     pthread_cond_init(&made->to_commit, NULL);
-    if (!options->synchronous) {
-        int code = start_threads(made, error);
-        if (code != LUMI_OK) {
-            stop_threads(made);
-            release(made);
-            return code;
-        }
+    made->full = true; /* until something is set aside */
+    store_reserve_kept(made, NULL);
+    int code = options->second_copy ? store_copy_create(made, error) : LUMI_OK;
+    if (code == LUMI_OK && !options->synchronous)
+        code = start_threads(made, error);
+    if (code != LUMI_OK) {
+        stop_threads(made);
+        store_copy_destroy(made->copy);
+        store_reserve_remove(made);
+        release(made);
+        return code;
     }
     *store = made;
     return LUMI_OK;
@@ -265,6 +289,8 @@ int lumi_store_close(struct lumi_store *store, struct lumi_error *error)
         lumi_store_work(store, 0);
     else
         stop_threads(store);
+    store_copy_destroy(store->copy);
+    store_reserve_remove(store);
     lumi_capture_close(store->capture);
     release(store);
     return LUMI_OK;
@@ -312,6 +338,7 @@ int lumi_store_give(struct lumi_store *store, const struct lumi_store_job *job, 
         store->last = &entry->next;
         store->jobs++;
         store->waiting += entry->bytes;
+        store->unwritten += entry->stage == STORE_WAITING;
         pthread_cond_signal(entry->stage == STORE_WAITING ? &store->to_write : &store->to_commit);
     }
     pthread_mutex_unlock(&store->lock);
@@ -352,6 +379,7 @@ void lumi_store_work(struct lumi_store *store, int jobs)
                 pthread_mutex_unlock(&store->lock);
                 store_write(store, entry);
                 pthread_mutex_lock(&store->lock);
+                store->unwritten--;
             }
             entry->stage = STORE_READY;
             count++;
@@ -362,6 +390,8 @@ void lumi_store_work(struct lumi_store *store, int jobs)
         left -= before - store->jobs;
         any = true;
     }
+    while (store->copy && store_copy_step(store->copy))
+        ;
     pthread_mutex_unlock(&store->lock);
     if (any)
         wake(store);
@@ -386,6 +416,9 @@ void lumi_store_figures(struct lumi_store *store, struct lumi_store_figures *fig
     figures->room = store->waiting < store->options.memory ? store->options.memory - store->waiting : 0;
     figures->jobs = store->jobs;
     figures->stored_bytes = store->stored_bytes;
+    if (store->copy)
+        store_copy_tell(store->copy, &figures->copy_behind_bytes, &figures->copy_code, figures->copy_text,
+                        sizeof figures->copy_text);
     for (int i = 0; i < STORE_SECONDS; i++) {
         const int64_t age = now - store->seconds[i].second;
         if (age > 0 && age <= over)

@@ -27,10 +27,10 @@ static int do_shot(struct lumi_store *store, const struct lumi_store_job *job, s
 
 static int do_frame(struct lumi_store *store, struct store_entry *entry, struct lumi_error *error)
 {
-    const struct lumi_capture_written written = {entry->temporary, entry->written, entry->sha256};
+    struct lumi_capture_written written = {entry->temporary, entry->written, entry->sha256, ""};
 
     LUMI_TRY(lumi_capture_adopt_file(store->capture, entry->job.frame, &written, &entry->job.file, error));
-    entry->temporary[0] = '\0';
+    memcpy(entry->file, written.file, sizeof entry->file);
     return LUMI_OK;
 }
 
@@ -111,31 +111,45 @@ static void fail(struct store_entry *entry, int code, const char *text)
     snprintf(entry->text, sizeof entry->text, "%.511s", text);
 }
 
-/* A job that fails leaves the others alone, unless it is the disk that fails: then all of them are undone. */
-static void do_group(struct lumi_store *store, struct store_entry **group, int count)
+/* Whether the disk failed, and not the job: then all of them are undone. */
+static bool disk_failed(const struct lumi_store *store, int code)
 {
-    struct lumi_error error = {0};
-    int code = lumi_capture_begin(store->capture, &error);
+    return !lumi_capture_in_batch(store->capture) || code == LUMI_ERR_NOSPACE || code == LUMI_ERR_IO;
+}
 
-    for (int i = 0; i < count && code == LUMI_OK; i++) {
+/* A job that fails leaves the others alone. */
+static int do_jobs(struct lumi_store *store, struct store_entry **group, int count, struct lumi_error *error)
+{
+    LUMI_TRY(lumi_capture_begin(store->capture, error));
+    for (int i = 0; i < count; i++) {
         struct lumi_error own = {0};
         if (group[i]->code != LUMI_OK)
             continue;
-        int result = lumi_capture_guard(store->capture, &own);
-        if (result == LUMI_OK)
-            result = lumi_capture_guarded(store->capture, do_job(store, group[i], &own), &own);
-        if (!lumi_capture_in_batch(store->capture) || result == LUMI_ERR_NOSPACE || result == LUMI_ERR_IO) {
-            error = own;
-            code = result != LUMI_OK ? result : LUMI_ERR_INTERNAL;
-        } else if (result != LUMI_OK) {
-            fail(group[i], result, own.text);
-        }
+        int code = lumi_capture_guard(store->capture, &own);
+        if (code == LUMI_OK)
+            code = lumi_capture_guarded(store->capture, do_job(store, group[i], &own), &own);
+        if (disk_failed(store, code))
+            return lumi_fail(error, code != LUMI_OK ? code : LUMI_ERR_INTERNAL, "%s", own.text);
+        if (code != LUMI_OK)
+            fail(group[i], code, own.text);
     }
-    if (code == LUMI_OK)
-        code = lumi_capture_commit(store->capture, &error);
+    return lumi_capture_commit(store->capture, error);
+}
+
+static void do_group(struct lumi_store *store, struct store_entry **group, int count)
+{
+    struct lumi_error error = {0};
+    int code = do_jobs(store, group, count, &error);
+
     if (code == LUMI_OK)
         return;
-    lumi_capture_rollback(store->capture);
+    lumi_capture_rollback(store->capture, true);
+    if (code == LUMI_ERR_NOSPACE && store_reserve_spend(store)) {
+        code = do_jobs(store, group, count, &error);
+        if (code == LUMI_OK)
+            return;
+        lumi_capture_rollback(store->capture, true);
+    }
     for (int i = 0; i < count; i++)
         if (group[i]->code == LUMI_OK)
             fail(group[i], code, error.text);
@@ -171,6 +185,7 @@ static int verify(struct lumi_store *store, struct lumi_error *error)
 
 static int seal(struct lumi_store *store, const struct lumi_store_job *job, struct lumi_error *error)
 {
+    store_reserve_remove(store);
     if (job->verify)
         LUMI_TRY(verify(store, error));
     return lumi_capture_seal(store->capture, job->date[0] ? job->date : NULL, error);

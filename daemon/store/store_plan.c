@@ -129,7 +129,7 @@ int lumi_store_plan(struct lumi_capture *capture, const struct lumi_rig *rig, co
     if (code == LUMI_OK)
         code = lumi_capture_commit(capture, error);
     if (code != LUMI_OK)
-        lumi_capture_rollback(capture);
+        lumi_capture_rollback(capture, false);
     lumi_free(rows);
     return code;
 }

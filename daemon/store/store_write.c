@@ -1,99 +1,73 @@
 /* A frame's bytes on their way to the disk. */
 #include "daemon/store/store_priv.h"
+#include "daemon/store/store_sink.h"
 
-#include "proto/base/file.h"
-#include "proto/base/memory.h"
-
-#include <errno.h>
 #include <fcntl.h>
-#include <nettle/sha2.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
-#define COPY_BUFFER ((size_t)1 << 20)
-
-struct target {
-    int fd;
-    const char *name;
-    struct sha256_ctx hash;
-    int64_t bytes;
-};
-
-static int put(struct target *target, const void *data, size_t size, struct lumi_error *error)
+static int put_path(struct store_sink *sink, const char *path, struct lumi_error *error)
 {
-    sha256_update(&target->hash, size, data);
-    target->bytes += (int64_t)size;
-    return lumi_write_all(target->fd, data, size) < 0 ? lumi_fail_errno(error, target->name, "write") : LUMI_OK;
-}
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
 
-static int put_file(struct target *target, const char *path, struct lumi_error *error)
-{
-    uint8_t *buffer = lumi_alloc(COPY_BUFFER, 1);
-    int fd = -1, code = LUMI_OK;
-
-    if (!buffer)
-        return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", path);
-    fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) {
-        code = lumi_fail_errno(error, path, "open");
-        goto done;
-    }
-    for (;;) {
-        ssize_t got = read(fd, buffer, COPY_BUFFER);
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0)
-            code = lumi_fail_errno(error, path, "read");
-        if (got <= 0)
-            break;
-        LUMI_GOTO(code, done, put(target, buffer, (size_t)got, error));
-    }
-done:
-    if (fd >= 0)
-        close(fd);
-    lumi_free(buffer);
+    if (fd < 0)
+        return lumi_fail_errno(error, path, "open");
+    const int code = store_sink_put_file(sink, fd, path, NULL, NULL, error);
+    close(fd);
     return code;
 }
 
-static int put_all(struct target *target, const struct lumi_store_job *job, struct lumi_error *error)
+static int put_all(struct store_sink *sink, const struct lumi_store_job *job, struct lumi_error *error)
 {
     if (job->path)
-        return put_file(target, job->path, error);
+        return put_path(sink, job->path, error);
     for (int i = 0; i < job->piece_count; i++)
-        LUMI_TRY(put(target, job->pieces[i].iov_base, job->pieces[i].iov_len, error));
+        LUMI_TRY(store_sink_put(sink, job->pieces[i].iov_base, job->pieces[i].iov_len, error));
     return LUMI_OK;
-}
-
-static void hex(struct sha256_ctx *hash, char text[65])
-{
-    uint8_t digest[SHA256_DIGEST_SIZE];
-
-    sha256_digest(hash, sizeof digest, digest);
-    for (size_t i = 0; i < sizeof digest; i++)
-        snprintf(text + 2 * i, 3, "%02x", digest[i]);
 }
 
 static int write_new(struct lumi_store *store, struct store_entry *entry, struct lumi_error *error)
 {
-    struct target target = {.fd = -1, .name = entry->temporary};
-    int code;
+    struct store_sink sink;
 
-    sha256_init(&target.hash);
-    target.fd = openat(store->folder, entry->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (target.fd < 0)
-        return lumi_fail_errno(error, lumi_capture_path(store->capture), "create a frame's file");
-    code = put_all(&target, &entry->job, error);
-    if (code == LUMI_OK && fsync(target.fd) < 0)
-        code = lumi_fail_errno(error, entry->temporary, "sync");
-    if (close(target.fd) < 0 && code == LUMI_OK)
-        code = lumi_fail_errno(error, entry->temporary, "close");
-    entry->written = target.bytes;
-    hex(&target.hash, entry->sha256);
+    LUMI_TRY(store_sink_open(&sink, store->folder, entry->temporary, error));
+    int code = put_all(&sink, &entry->job, error);
+    code = store_sink_close(&sink, code, &entry->written, entry->sha256, error);
     if (code != LUMI_OK)
         unlinkat(store->folder, entry->temporary, 0);
     return code;
 }
+
+/* ---- Room for rows ---- */
+
+#define RESERVE ".rows.tmp" /* a name that is cleared away after a crash */
+#define RESERVE_BYTES ((int64_t)8 << 20)
+
+int store_reserve_kept(struct lumi_store *store, struct lumi_error *error)
+{
+    pthread_mutex_lock(&store->lock);
+    if (store->full && store_reserve(store->folder, RESERVE, RESERVE_BYTES) == 0)
+        store->full = false;
+    const bool full = store->full;
+    pthread_mutex_unlock(&store->lock);
+    return full ? lumi_fail(error, LUMI_ERR_NOSPACE, "the disk is full") : LUMI_OK;
+}
+
+bool store_reserve_spend(struct lumi_store *store)
+{
+    pthread_mutex_lock(&store->lock);
+    store->full = true;
+    pthread_mutex_unlock(&store->lock);
+    return unlinkat(store->folder, RESERVE, 0) == 0;
+}
+
+void store_reserve_remove(struct lumi_store *store)
+{
+    unlinkat(store->folder, RESERVE, 0);
+}
+
+/* ---- A frame ---- */
 
 void store_write(struct lumi_store *store, struct store_entry *entry)
 {
@@ -102,13 +76,21 @@ void store_write(struct lumi_store *store, struct store_entry *entry)
 
     if (entry->job.prepare)
         code = entry->job.prepare(entry->job.context, &entry->job, &error);
+    if (code == LUMI_OK && entry->job.piece_count > LUMI_STORE_IOV)
+        code = lumi_fail(&error, LUMI_ERR_ARG, "a frame in %d pieces", entry->job.piece_count);
     if (code == LUMI_OK && store->options.disk)
         code = store->options.disk(store->options.context, entry->bytes, &error);
+    if (code == LUMI_OK)
+        code = store_reserve_kept(store, &error);
     if (code == LUMI_OK) {
         snprintf(entry->temporary, sizeof entry->temporary, ".s%llu.tmp", (unsigned long long)entry->number);
         code = write_new(store, entry, &error);
-        if (code != LUMI_OK)
-            entry->temporary[0] = '\0';
+    }
+    if (code != LUMI_OK) {
+        char place[512];
+        entry->temporary[0] = '\0';
+        snprintf(place, sizeof place, "%.511s", lumi_capture_path(store->capture));
+        lumi_fail_prefix(&error, "%s", place);
     }
     entry->code = code;
     snprintf(entry->text, sizeof entry->text, "%.511s", error.text);

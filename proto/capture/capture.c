@@ -399,11 +399,13 @@ int lumi_capture_commit(struct lumi_capture *capture, struct lumi_error *error)
     return LUMI_OK;
 }
 
-void lumi_capture_rollback(struct lumi_capture *capture)
+void lumi_capture_rollback(struct lumi_capture *capture, bool again)
 {
     if (!capture->in_batch)
         return;
     sqlite3_exec(capture->db, "ROLLBACK", NULL, NULL, NULL);
+    if (again)
+        capture_give_back(capture);
     capture_drop_pending(capture, true);
     capture->in_batch = false;
 }
@@ -455,7 +457,7 @@ void lumi_capture_close(struct lumi_capture *capture)
 {
     if (!capture)
         return;
-    lumi_capture_rollback(capture);
+    lumi_capture_rollback(capture, false);
     if (capture->final_path) {
         sqlite3_close(capture->db);
         capture->db = NULL;

@@ -59,8 +59,9 @@ void lumi_capture_close(struct lumi_capture *capture);
 /* Between these, rows are committed and files synced once, at the commit, instead of one by one. Not nested. */
 int lumi_capture_begin(struct lumi_capture *capture, struct lumi_error *error);
 int lumi_capture_commit(struct lumi_capture *capture, struct lumi_error *error);
-/* What was begun is undone, rows and files. A batch whose commit failed is still there until this. */
-void lumi_capture_rollback(struct lumi_capture *capture);
+/* What was begun is undone, rows and files. A batch whose commit failed is still there until this. `again`: adopted
+ * files get their temporary names back. */
+void lumi_capture_rollback(struct lumi_capture *capture, bool again);
 /* Whether a batch has begun and is still whole: after some failures (disk full) SQLite has undone all of it by itself;
  * then only lumi_capture_rollback may follow. */
 bool lumi_capture_in_batch(const struct lumi_capture *capture);
@@ -204,10 +205,11 @@ int lumi_capture_store_bytes(struct lumi_capture *capture, int64_t frame, const 
 struct lumi_capture_written {
     const char *temporary;
     int64_t bytes;
-    const char *sha256; /* 64 hexadecimal digits */
+    const char *sha256;           /* 64 hexadecimal digits */
+    char file[LUMI_CAPTURE_PATH]; /* out: where it is now, relative to the capture */
 };
 int lumi_capture_frames_folder(const struct lumi_capture *capture);
-int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, const struct lumi_capture_written *written,
+int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, struct lumi_capture_written *written,
                             const struct lumi_capture_file *file, struct lumi_error *error);
 
 /* received → accepted or rejected, accepted ↔ rejected, triggered → rejected (lost). `sharpness` and `reason` (NULL:

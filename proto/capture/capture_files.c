@@ -112,7 +112,7 @@ static int add_pending(struct lumi_capture *capture, const char *name, bool sync
     if (!copy)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", capture->path);
     memcpy(copy, name, strlen(name) + 1);
-    capture->pending[capture->pending_count++] = (struct capture_pending){copy, synced};
+    capture->pending[capture->pending_count++] = (struct capture_pending){.name = copy, .synced = synced};
     return LUMI_OK;
 }
 
@@ -132,6 +132,13 @@ void capture_drop_pending(struct lumi_capture *capture, bool remove)
 static void forget_pending(struct lumi_capture *capture)
 {
     lumi_free(capture->pending[--capture->pending_count].name);
+}
+
+void capture_give_back(struct lumi_capture *capture)
+{
+    for (int i = 0; i < capture->pending_count; i++)
+        if (capture->pending[i].temporary[0])
+            renameat(capture->frames_fd, capture->pending[i].name, capture->frames_fd, capture->pending[i].temporary);
 }
 
 int capture_sync_pending(struct lumi_capture *capture, struct lumi_error *error)
@@ -368,7 +375,7 @@ int lumi_capture_frames_folder(const struct lumi_capture *capture)
     return capture->frames_fd;
 }
 
-int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, const struct lumi_capture_written *written,
+int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, struct lumi_capture_written *written,
                             const struct lumi_capture_file *file, struct lumi_error *error)
 {
     char name[LUMI_CAPTURE_NAME + 12];
@@ -382,7 +389,10 @@ int lumi_capture_adopt_file(struct lumi_capture *capture, int64_t frame, const s
     LUMI_TRY(check_store(capture, &planned, file, error));
     snprintf(name, sizeof name, "%s%s", planned.name, file->extension);
     snprintf(stored.sha256, sizeof stored.sha256, "%s", written->sha256);
+    snprintf(written->file, sizeof written->file, CAPTURE_FRAMES "/%s", name);
     LUMI_TRY(add_pending(capture, name, true, error));
+    struct capture_pending *pending = &capture->pending[capture->pending_count - 1];
+    snprintf(pending->temporary, sizeof pending->temporary, "%s", written->temporary);
     int code = LUMI_OK;
     if (renameat(capture->frames_fd, written->temporary, capture->frames_fd, name) < 0)
         code = lumi_fail_errno(error, name, "rename");

@@ -13,8 +13,9 @@
 #define CAPTURE_SEAL "tagmanifest-sha256.txt" /* written last, removed first: its presence means sealed */
 
 struct capture_pending {
-    char *name;  /* in data/frames */
-    bool synced; /* by who wrote it */
+    char *name;                        /* in data/frames */
+    bool synced;                       /* by who wrote it */
+    char temporary[LUMI_CAPTURE_NAME]; /* its name before; "" none */
 };
 
 struct lumi_capture {
@@ -82,6 +83,8 @@ bool capture_file_ok(const char *file);
 int capture_sync_pending(struct lumi_capture *capture, struct lumi_error *error);
 /* Forgets what was stored in this batch; removes the files if `remove`. */
 void capture_drop_pending(struct lumi_capture *capture, bool remove);
+/* What others wrote gets its temporary name back. */
+void capture_give_back(struct lumi_capture *capture);
 /* Mends what a crash left behind. */
 int capture_reconcile(struct lumi_capture *capture, struct lumi_error *error);
 /* Creates `name` under the directory with these bytes: temporary file, fsync, rename, fsync of the directory. */
