@@ -5,7 +5,8 @@
  * 1. Memory is bounded: lumi_store_room says how many bytes may still be given; what is over is refused
  * (LUMI_ERR_LIMIT).
  * 2. What was reported done survives a kill and a pulled plug. What was not is done whole or not at all.
- * 3. The second copy never holds the first one up: where it lags, it is filled in later, from the first.
+ * 3. The second copy never holds the first one up: it is made from the first while no frame waits for the disk. A seal
+ *    is done when the copy has caught up and is verified, or is given up; which of them done.text tells.
  * 4. With `synchronous` nothing happens but in lumi_store_work, so that a slow disk can be simulated in virtual time.
  */
 #ifndef LUMI_DAEMON_STORE_STORE_H
@@ -85,7 +86,7 @@ struct lumi_store_done {
 
 struct lumi_store_options {
     size_t memory;               /* bytes of frames that may wait (512 MiB) */
-    const char *second_copy;     /* a directory on another disk; NULL: none */
+    const char *second_copy;     /* a directory on another disk, the caller's until the store is closed; NULL: none */
     int writers;                 /* threads; 0: by the number of processors */
     bool synchronous;            /* no threads: lumi_store_work does the work, for virtual time */
     void (*wake)(void *context); /* when something is done */
@@ -101,7 +102,7 @@ void lumi_store_options_init(struct lumi_store_options *options);
 /* The capture is open for writing and becomes the store's if this succeeds; lumi_store_close closes it. */
 int lumi_store_open(struct lumi_capture *capture, const struct lumi_store_options *options, struct lumi_store **store,
                     struct lumi_error *error);
-/* Finishes what was given, then closes. */
+/* Finishes what was given, then closes. A second copy that is behind, without a seal, is gone on with next time. */
 int lumi_store_close(struct lumi_store *store, struct lumi_error *error);
 
 /* Copies the job (not the pieces). LUMI_ERR_LIMIT: no room for its bytes; one frame always has room where nothing else

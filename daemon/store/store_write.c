@@ -41,13 +41,12 @@ static int write_new(struct lumi_store *store, struct store_entry *entry, struct
 
 /* ---- Room for rows ---- */
 
-#define RESERVE ".rows.tmp" /* a name that is cleared away after a crash */
 #define RESERVE_BYTES ((int64_t)8 << 20)
 
 int store_reserve_kept(struct lumi_store *store, struct lumi_error *error)
 {
     pthread_mutex_lock(&store->lock);
-    if (store->full && store_reserve(store->folder, RESERVE, RESERVE_BYTES) == 0)
+    if (store->full && store_reserve(store->folder, LUMI_CAPTURE_RESERVE, RESERVE_BYTES) == 0)
         store->full = false;
     const bool full = store->full;
     pthread_mutex_unlock(&store->lock);
@@ -59,12 +58,12 @@ bool store_reserve_spend(struct lumi_store *store)
     pthread_mutex_lock(&store->lock);
     store->full = true;
     pthread_mutex_unlock(&store->lock);
-    return unlinkat(store->folder, RESERVE, 0) == 0;
+    return unlinkat(store->folder, LUMI_CAPTURE_RESERVE, 0) == 0;
 }
 
 void store_reserve_remove(struct lumi_store *store)
 {
-    unlinkat(store->folder, RESERVE, 0);
+    unlinkat(store->folder, LUMI_CAPTURE_RESERVE, 0);
 }
 
 /* ---- A frame ---- */

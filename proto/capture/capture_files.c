@@ -477,6 +477,7 @@ static int reconcile_rows(struct lumi_capture *capture, struct lumi_error *error
 
 int capture_reconcile(struct lumi_capture *capture, struct lumi_error *error)
 {
+    unlinkat(capture->frames_fd, LUMI_CAPTURE_RESERVE, 0);
     LUMI_TRY(reconcile_files(capture, error));
     return reconcile_rows(capture, error);
 }

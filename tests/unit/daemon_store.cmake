@@ -1,1 +1,1 @@
-lumi_test(test_store FOLDERS store capture mechanism base)
+lumi_test(test_store FOLDERS store capture mechanism base LABELS threads)
