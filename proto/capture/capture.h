@@ -202,8 +202,8 @@ int lumi_capture_store_bytes(struct lumi_capture *capture, int64_t frame, const 
 /* For a writer that brings the bytes to the disk by itself, in threads of its own: the folder of the frames' files as a
  * descriptor (the capture's), in which it makes files called ".<anything>.tmp", synced; in a batch this then gives such
  * a file its name and its row. On failure the temporary file is still there. */
-#define LUMI_CAPTURE_RESERVE "../../.rows.tmp" /* from there: a file that keeps room for rows; it is gone when sealed  \
-                                                */
+/* From there: a file that keeps room for rows; gone when it is sealed. */
+#define LUMI_CAPTURE_RESERVE "../../.rows.tmp"
 struct lumi_capture_written {
     const char *temporary;
     int64_t bytes;
