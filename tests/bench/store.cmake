@@ -1,0 +1,2 @@
+add_executable(bench_store bench_store.c)
+target_link_libraries(bench_store PRIVATE lumi_flags lumi_store lumi_capture lumi_base)
