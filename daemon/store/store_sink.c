@@ -1,4 +1,5 @@
-/* Bytes on their way past the page cache.
+/* Bytes on their way past the page cache. What is aligned in memory and in the file (a head of whole 4096 bytes, then
+ * pixels in pages of their own) is not copied.
  *
  * Measured on an NVMe disk under ext4 (docs/capture-format.md): written in the ordinary way and synced, frames of 5.5
  * MB reach a third of the disk's speed and push everything else out of the page cache; with O_DIRECT from several
@@ -81,7 +82,9 @@ int store_sink_put(struct store_sink *sink, const void *data, size_t size, struc
 
     sink->at += (int64_t)size;
     while (size > 0) {
-        if (sink->held == 0 && size >= ALIGN && (uintptr_t)from % ALIGN == 0) {
+        if (sink->held % ALIGN == 0 && size >= ALIGN && (uintptr_t)from % ALIGN == 0) {
+            if (sink->held > 0)
+                LUMI_TRY(flush(sink, error));
             const size_t span = (size < SPAN ? size : SPAN) / ALIGN * ALIGN;
             sha256_update(&sink->hash, span, from);
             LUMI_TRY(put_direct(sink, from, span, error));
