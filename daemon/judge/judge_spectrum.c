@@ -19,7 +19,7 @@
 #define BINS (HALF * PART)
 #define PARTS_X 6
 #define PARTS_Y 4
-#define BASES 10
+#define BASES 12
 #define ANGLES 60
 #define LENGTHS 70
 #define LENGTH_LEAST 1.6
@@ -35,8 +35,8 @@
 
 /* Thresholds, set on pictures whose truth is known (docs/judgement.md): the share of the residual that the stripes
  * explain, and how deep they are against what theory says. */
-#define EXPLAINED_LEAST 0.15
-#define DEPTH_LEAST 0.35
+#define EXPLAINED_LEAST 0.14
+#define DEPTH_LEAST 0.15
 
 struct work {
     float re[PART * PART], im[PART * PART];
@@ -178,16 +178,11 @@ static void take_smooth_out(struct work *work)
 {
     for (int i = 0; i < BINS; i++) {
         double f = (double)work->f[i], phi = (double)work->phi[i];
-        const double values[BASES] = {1,
-                                      log(f + 1e-3),
-                                      f,
-                                      f * f,
-                                      cos(2 * phi),
-                                      sin(2 * phi),
-                                      cos(4 * phi),
-                                      log(f + 1e-3) * cos(2 * phi),
-                                      log(f + 1e-3) * sin(2 * phi),
-                                      log(f + 1e-3) * cos(4 * phi)};
+        const double values[BASES] = {1, log(f + 1e-3), f, f * f, cos(2 * phi), sin(2 * phi), cos(4 * phi),
+                                      log(f + 1e-3) * cos(2 * phi), log(f + 1e-3) * sin(2 * phi),
+                                      log(f + 1e-3) * cos(4 * phi),
+                                      /* walls, shelves and horizons: a ridge along either axis */
+                                      log(fabs(f * cos(phi)) + 1.0 / PART), log(fabs(f * sin(phi)) + 1.0 / PART)};
         for (int k = 0; k < BASES; k++)
             work->base[k][i] = (float)values[k];
     }

@@ -208,7 +208,7 @@ static int keep_numbers(struct lumi_capture *capture, const struct lumi_exchange
 
 static const char *extension_for(const char *path, enum lumi_image_format format)
 {
-    static const char *const canonical[] = {"", ".jpg", ".png", ".tif", ".exr"};
+    static const char *const canonical[] = {"", ".jpg", ".png", ".tif", ".exr", ".dng"};
     const char *dot = strrchr(path, '.');
 
     return lumi_image_format_of_name(path) == format ? dot : canonical[format];

@@ -15,10 +15,8 @@
 #define HEADER_BYTES ((size_t)256 << 10) /* enough for the header of nearly every file but TIFF */
 
 static const struct image_codec *const codecs[] = {
-    [LUMI_IMAGE_JPEG] = &image_jpeg,
-    [LUMI_IMAGE_PNG] = &image_png,
-    [LUMI_IMAGE_TIFF] = &image_tiff,
-    [LUMI_IMAGE_EXR] = &image_exr,
+    [LUMI_IMAGE_JPEG] = &image_jpeg, [LUMI_IMAGE_PNG] = &image_png, [LUMI_IMAGE_TIFF] = &image_tiff,
+    [LUMI_IMAGE_EXR] = &image_exr,   [LUMI_IMAGE_RAW] = &image_raw,
 };
 
 void lumi_image_meta_finish(struct lumi_image_meta *meta)
@@ -57,7 +55,8 @@ int image_claim(const struct image_source *source, const struct lumi_image_info 
 
 static const struct image_codec *find(const struct image_source *source, enum lumi_image_format *format)
 {
-    for (int i = LUMI_IMAGE_JPEG; i <= LUMI_IMAGE_EXR; i++)
+    /* Raw files first: most of them are TIFF as well. */
+    for (int i = LUMI_IMAGE_RAW; i >= LUMI_IMAGE_JPEG; i--)
         if (codecs[i]->probe(source->data, source->size)) {
             *format = (enum lumi_image_format)i;
             return codecs[i];
@@ -73,7 +72,7 @@ static int read_source(const struct image_source *source, struct lumi_raster *ra
         return lumi_fail(source->error, LUMI_ERR_FORMAT, "%s: the file is empty", source->name);
     const struct image_codec *codec = find(source, &format);
     if (!codec)
-        return lumi_fail(source->error, LUMI_ERR_UNSUPPORTED, "%s: not a JPEG, PNG, TIFF or OpenEXR image",
+        return lumi_fail(source->error, LUMI_ERR_UNSUPPORTED, "%s: not a JPEG, PNG, TIFF, OpenEXR or raw image",
                          source->name);
     meta->info.format = format;
     meta->info.orientation = 1;
@@ -182,7 +181,8 @@ static bool meta_from_beginning(const char *path, struct lumi_image_meta *meta)
     if (data && !fstat(fd, &status) && S_ISREG(status.st_mode)) {
         ssize_t got = read(fd, data, HEADER_BYTES);
         struct image_source source = {data, got > 0 ? (size_t)got : 0, (uint64_t)status.st_size, path, NULL};
-        done = got > 0 && !image_tiff.probe(data, source.size) && read_source(&source, NULL, meta) == LUMI_OK;
+        done = got > 0 && !image_tiff.probe(data, source.size) && !image_raw.probe(data, source.size) &&
+               read_source(&source, NULL, meta) == LUMI_OK;
         if (!done)
             lumi_image_meta_finish(meta);
     }
@@ -228,8 +228,16 @@ enum lumi_image_format lumi_image_format_of_name(const char *path)
     static const struct {
         const char *extension;
         enum lumi_image_format format;
-    } known[] = {{".jpg", LUMI_IMAGE_JPEG}, {".jpeg", LUMI_IMAGE_JPEG}, {".png", LUMI_IMAGE_PNG},
-                 {".tif", LUMI_IMAGE_TIFF}, {".tiff", LUMI_IMAGE_TIFF}, {".exr", LUMI_IMAGE_EXR}};
+    } known[] = {
+        {".jpg", LUMI_IMAGE_JPEG},  {".jpeg", LUMI_IMAGE_JPEG}, {".png", LUMI_IMAGE_PNG}, {".tif", LUMI_IMAGE_TIFF},
+        {".tiff", LUMI_IMAGE_TIFF}, {".exr", LUMI_IMAGE_EXR},   {".dng", LUMI_IMAGE_RAW}, {".nef", LUMI_IMAGE_RAW},
+        {".nrw", LUMI_IMAGE_RAW},   {".cr2", LUMI_IMAGE_RAW},   {".cr3", LUMI_IMAGE_RAW}, {".crw", LUMI_IMAGE_RAW},
+        {".arw", LUMI_IMAGE_RAW},   {".srf", LUMI_IMAGE_RAW},   {".sr2", LUMI_IMAGE_RAW}, {".raf", LUMI_IMAGE_RAW},
+        {".orf", LUMI_IMAGE_RAW},   {".rw2", LUMI_IMAGE_RAW},   {".pef", LUMI_IMAGE_RAW}, {".srw", LUMI_IMAGE_RAW},
+        {".3fr", LUMI_IMAGE_RAW},   {".iiq", LUMI_IMAGE_RAW},   {".mrw", LUMI_IMAGE_RAW}, {".erf", LUMI_IMAGE_RAW},
+        {".kdc", LUMI_IMAGE_RAW},   {".dcr", LUMI_IMAGE_RAW},   {".mef", LUMI_IMAGE_RAW}, {".mos", LUMI_IMAGE_RAW},
+        {".rwl", LUMI_IMAGE_RAW},   {".raw", LUMI_IMAGE_RAW},
+    };
     const char *slash = strrchr(path, '/');
     const char *dot = strrchr(slash ? slash : path, '.');
 

@@ -1,9 +1,11 @@
 /* Pixels at rest: JPEG (8 bit), PNG (8, 16 bit), TIFF (8, 16 bit, float) and OpenEXR (half, float), to and from
- * rasters.
+ * rasters; DNG and makers' raw files from them.
  *
  * 1. What a file is is told by its first bytes, never by its name.
  * 2. U8 and U16 rasters are sRGB-encoded, F32 ones linear light: JPEG and integer PNG and TIFF read as the former,
- *    OpenEXR and floating-point TIFF as the latter. Embedded colour profiles are not applied.
+ *    OpenEXR, floating-point TIFF and raw files as the latter: these are developed with the black level and the white
+ *    balance they carry, nothing depends on the picture, 1 is the sensor's white. Embedded colour profiles are not
+ *    applied.
  * 3. Anything a library complains about is an error, warnings such as "premature end of JPEG data" included: one line
  *    that names the file, and no pixels. Nothing is printed.
  * 4. Memory is bounded before it is asked for: no side over LUMI_RASTER_MAX, at most LUMI_IMAGE_MAX_PIXELS pixels, and
@@ -33,7 +35,8 @@ enum lumi_image_format {
     LUMI_IMAGE_JPEG = 1,
     LUMI_IMAGE_PNG = 2,
     LUMI_IMAGE_TIFF = 3,
-    LUMI_IMAGE_EXR = 4
+    LUMI_IMAGE_EXR = 4,
+    LUMI_IMAGE_RAW = 5 /* read only */
 };
 
 /* What a file holds, from its header alone. */
@@ -51,6 +54,9 @@ struct lumi_image_meta {
     size_t exif_size;
     double exposure_s; /* from the EXIF block, 0 where it does not say */
     double iso;
+    int64_t taken_us; /* Unix time of the exposure; where the file names no time zone, as if the camera's clock showed
+                         universal time; 0: it does not say */
+    char serial[64], model[64]; /* of the camera's body; "" */
 };
 
 void lumi_image_meta_finish(struct lumi_image_meta *meta);

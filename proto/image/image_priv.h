@@ -1,4 +1,4 @@
-/* What the four formats share. */
+/* What the formats share. */
 #ifndef LUMI_PROTO_IMAGE_IMAGE_PRIV_H
 #define LUMI_PROTO_IMAGE_IMAGE_PRIV_H
 
@@ -23,7 +23,7 @@ struct image_codec {
                   struct lumi_error *error);
 };
 
-extern const struct image_codec image_jpeg, image_png, image_tiff, image_exr;
+extern const struct image_codec image_jpeg, image_png, image_tiff, image_exr, image_raw;
 
 /* Fills `info` and checks the limits of image.h. */
 int image_describe(const struct image_source *source, uint64_t width, uint64_t height, int channels,
@@ -35,6 +35,8 @@ int image_claim(const struct image_source *source, const struct lumi_image_info 
 int image_exr_channel(const struct image_source *source, const char *channel, struct lumi_raster *raster);
 
 /* Copies an EXIF block into meta and takes from it what meta has fields for, as far as the block makes sense. */
+/* As far as it goes, from a TIFF file too; nothing is kept of it. */
+void image_scan_exif(const void *exif, size_t size, struct lumi_image_meta *meta);
 int image_keep_exif(const struct image_source *source, const void *exif, size_t size, struct lumi_image_meta *meta);
 
 #endif

@@ -129,7 +129,7 @@ struct read_job {
     const struct image_source *source;
     struct stream stream;
     TIFF *tiff;
-    bool separate, inverted;
+    bool separate, inverted, ycbcr;
     struct lumi_raster *raster;
 };
 
@@ -164,8 +164,10 @@ static int describe(struct read_job *job, struct lumi_image_info *info)
     bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
     bool integer = format == SAMPLEFORMAT_UINT && (bits == 8 || bits == 16);
     bool real = format == SAMPLEFORMAT_IEEEFP && bits == 32;
+    job->ycbcr = photometric == PHOTOMETRIC_YCBCR && samples == 3 && bits == 8 && integer &&
+                 compression == COMPRESSION_NONE && planar == PLANARCONFIG_CONTIG && !TIFFIsTiled(job->tiff);
     if (!(integer || real) || !known_compression(compression) ||
-        !((grey && samples == 1) || (photometric == PHOTOMETRIC_RGB && (samples == 3 || samples == 4))))
+        !((grey && samples == 1) || (photometric == PHOTOMETRIC_RGB && (samples == 3 || samples == 4)) || job->ycbcr))
         return lumi_fail(job->source->error, LUMI_ERR_UNSUPPORTED,
                          "%s: a TIFF of %u samples of %u bits (format %u, photometric %u, compression %u)",
                          job->source->name, samples, bits, format, photometric, compression);
@@ -246,6 +248,32 @@ static int read_tiles(struct read_job *job)
     return code;
 }
 
+/* Luminance and colour differences, as video cameras deliver them, to RGB. */
+static int read_ycbcr(struct read_job *job, int orientation)
+{
+    const struct lumi_raster *raster = job->raster;
+    uint32_t width = (uint32_t)raster->width, height = (uint32_t)raster->height;
+    int code = LUMI_OK;
+    uint32_t *pixels = lumi_alloc((size_t)width * height, sizeof *pixels);
+
+    if (!pixels)
+        return lumi_fail(job->source->error, LUMI_ERR_NOMEM, "%s: no memory for the image", job->source->name);
+    /* Asked for in the orientation it has, the picture is left as it lies in the file. */
+    if (TIFFReadRGBAImageOriented(job->tiff, width, height, pixels, orientation, 1) != 1 || job->stream.text[0])
+        code = fail_tiff(job, "the image cannot be decoded");
+    for (uint32_t y = 0; code == LUMI_OK && y < height; y++) {
+        uint8_t *out = lumi_row_u8(raster, (int)y);
+        for (uint32_t x = 0; x < width; x++) {
+            uint32_t pixel = pixels[(size_t)y * width + x];
+            out[3 * x] = (uint8_t)TIFFGetR(pixel);
+            out[3 * x + 1] = (uint8_t)TIFFGetG(pixel);
+            out[3 * x + 2] = (uint8_t)TIFFGetB(pixel);
+        }
+    }
+    lumi_free(pixels);
+    return code;
+}
+
 /* MINISWHITE: 0 is white. */
 static void invert(const struct lumi_raster *raster)
 {
@@ -272,11 +300,15 @@ static int read_tiff(const struct image_source *source, struct lumi_raster *rast
     int code = describe(&job, &meta->info);
     if (code == LUMI_OK && raster)
         code = image_claim(source, &meta->info, raster);
-    if (code == LUMI_OK && raster)
+    if (code == LUMI_OK && raster && job.ycbcr)
+        code = read_ycbcr(&job, meta->info.orientation);
+    else if (code == LUMI_OK && raster)
         code = TIFFIsTiled(job.tiff) ? read_tiles(&job) : read_strips(&job);
     if (code == LUMI_OK && raster && job.inverted)
         invert(raster);
     TIFFClose(job.tiff);
+    if (code == LUMI_OK)
+        image_scan_exif(source->data, source->size, meta);
     return code;
 }
 

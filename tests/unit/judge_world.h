@@ -70,7 +70,7 @@ static inline void world_spread(struct lumi_raster *light, const double (*places
 static inline void world_smear(struct lumi_raster *light, double length, double angle)
 {
     double places[256][2];
-    int count = (int)(4 * length) + 2;
+    int count = (int)(2 * length) + 2;
 
     count = count > 256 ? 256 : count;
     for (int i = 0; i < count; i++) {

@@ -1,0 +1,1 @@
+lumi_test(test_frame_file FOLDERS camera image sim)
