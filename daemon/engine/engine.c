@@ -8,15 +8,24 @@
 #include <string.h>
 
 static const engine_stage_fn stages[ENGINE_STAGES] = {
-    [STAGE_LINK] = engine_stage_link,         [STAGE_PROFILE] = engine_stage_profile,
-    [STAGE_CAMERAS] = engine_stage_cameras,   [STAGE_TRIGGERS] = engine_stage_triggers,
-    [STAGE_VERDICT] = engine_stage_verdict,   [STAGE_ROWS] = engine_stage_rows,
-    [STAGE_HOME] = engine_stage_home,         [STAGE_ARM] = engine_stage_arm,
-    [STAGE_LOAD] = engine_stage_load,         [STAGE_READ] = engine_stage_read,
-    [STAGE_MARK] = engine_stage_mark,         [STAGE_START] = engine_stage_start,
-    [STAGE_SWEEP] = engine_stage_sweep,       [STAGE_PAUSED] = engine_stage_paused,
-    [STAGE_INTERRUPTED] = engine_stage_interrupted, [STAGE_AFTER] = engine_stage_after,
-    [STAGE_DRAIN] = engine_stage_drain,       [STAGE_SEAL] = engine_stage_seal,
+    [STAGE_LINK] = engine_stage_link,
+    [STAGE_PROFILE] = engine_stage_profile,
+    [STAGE_CAMERAS] = engine_stage_cameras,
+    [STAGE_TRIGGERS] = engine_stage_triggers,
+    [STAGE_VERDICT] = engine_stage_verdict,
+    [STAGE_ROWS] = engine_stage_rows,
+    [STAGE_HOME] = engine_stage_home,
+    [STAGE_ARM] = engine_stage_arm,
+    [STAGE_LOAD] = engine_stage_load,
+    [STAGE_READ] = engine_stage_read,
+    [STAGE_MARK] = engine_stage_mark,
+    [STAGE_START] = engine_stage_start,
+    [STAGE_SWEEP] = engine_stage_sweep,
+    [STAGE_PAUSED] = engine_stage_paused,
+    [STAGE_INTERRUPTED] = engine_stage_interrupted,
+    [STAGE_AFTER] = engine_stage_after,
+    [STAGE_DRAIN] = engine_stage_drain,
+    [STAGE_SEAL] = engine_stage_seal,
     [STAGE_CLOSE] = engine_stage_close,
 };
 
@@ -199,10 +208,10 @@ void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, in
         told.lost = e->account_shots && e->account_shots[shot].state == SHOT_LOST;
     if (kind == LUMI_TALE_FRAME) {
         static const enum lumi_frame_state states[] = {
-            [AT_NONE] = LUMI_FRAME_PLANNED,      [AT_PLANNED] = LUMI_FRAME_PLANNED,
+            [AT_NONE] = LUMI_FRAME_PLANNED,        [AT_PLANNED] = LUMI_FRAME_PLANNED,
             [AT_TRIGGERED] = LUMI_FRAME_TRIGGERED, [AT_RECEIVED] = LUMI_FRAME_TRIGGERED,
-            [AT_STORED] = LUMI_FRAME_RECEIVED,   [AT_ACCEPTED] = LUMI_FRAME_ACCEPTED,
-            [AT_REJECTED] = LUMI_FRAME_REJECTED, [AT_MISSING] = LUMI_FRAME_REJECTED};
+            [AT_STORED] = LUMI_FRAME_RECEIVED,     [AT_ACCEPTED] = LUMI_FRAME_ACCEPTED,
+            [AT_REJECTED] = LUMI_FRAME_REJECTED,   [AT_MISSING] = LUMI_FRAME_REJECTED};
         told.frame_state = states[engine_frame_at(e, shot, camera)->at];
     }
     if (kind == LUMI_TALE_CHECK)

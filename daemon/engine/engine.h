@@ -9,7 +9,8 @@
  * committed.
  * 3. After a crash lumi_engine_recover finds the capture that was being taken; what store, board and cameras say is
  *    brought together, and the sweep goes on.
- * 4. Whatever goes wrong, every planned frame ends as stored (file, checksum) or as missing with a reason. */
+ * 4. The ports return at once; what they are asked for is answered later, never from within them.
+ * 5. Whatever goes wrong, every planned frame ends as stored (file, checksum) or as missing with a reason. */
 #ifndef LUMI_DAEMON_ENGINE_ENGINE_H
 #define LUMI_DAEMON_ENGINE_ENGINE_H
 
@@ -20,6 +21,7 @@
 #include "daemon/store/store.h"
 #include "proto/mechanism/sweep_plan.h"
 
+/* Cameras are counted as in config.cameras, everywhere below. */
 struct lumi_engine;
 
 /* ---- what is configured ---- */
@@ -103,7 +105,7 @@ struct lumi_engine_ports {
     void (*lamp)(void *context, bool on);                                  /* NULL likewise */
     void (*judge)(void *context, const struct lumi_engine_judge_job *job); /* answered by lumi_engine_judged */
     void (*hand_over)(void *context, const char *capture);
-    void (*told)(void *context, const struct lumi_engine_told *told); /* must not call the engine */
+    void (*told)(void *context, const struct lumi_engine_told *told);
 };
 
 /* ---- life ---- */

@@ -235,6 +235,9 @@ static void retake_row(struct lumi_engine *e, struct engine_flight *flight, cons
     frame->row = done->frame;
     frame->dead_row = false;
     frame->exposed_ns = LUMI_NO_TIME;
+    char *name = e->names[(size_t)flight->shot * (size_t)e->config.camera_count + (size_t)flight->camera];
+    if (strlen(name) + 3 < LUMI_CAPTURE_NAME)
+        strcat(name, ".2"); /* as lumi_capture_retake_frame calls it */
     engine_frame_go(e, flight->shot, flight->camera, AT_PLANNED, NULL);
 }
 

@@ -104,7 +104,7 @@ static void done(struct lumi_engine *e, int camera, const struct lumi_camera_not
         return;
     c->command = 0;
     c->command_code = notice->code;
-    snprintf(c->command_text, sizeof c->command_text, "%s", notice->text);
+    snprintf(c->command_text, sizeof c->command_text, "%.255s", notice->text);
     if (notice->code != LUMI_OK) {
         if (c->command_kind == LUMI_CAMERA_EXPOSE && engine_taking(e))
             engine_incident(e, camera, "exposure", "camera %s did not take its exposure time: %s",

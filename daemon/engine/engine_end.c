@@ -37,10 +37,11 @@ static void close_sweep(struct lumi_engine *e, const char *text)
         if (!clock.known || !(flight = engine_flight(e, LUMI_STORE_CLOCK)))
             continue;
         flight->job.camera = e->cameras[c].rig;
+        flight->job.clock.frames = (int)clock.matched;
         flight->job.clock.offset_s = clock.offset_s;
         flight->job.clock.drift_ppm = clock.drift_ppm;
         flight->job.clock.residual_s = clock.residual_s;
-        flight->job.clock.residual_worst_s = clock.residual_worst_s;
+        flight->job.clock.worst_s = clock.residual_worst_s;
         engine_flight_give(e, flight);
     }
     engine_sweep_row(e, true, text);
@@ -112,8 +113,9 @@ static void name_missing(struct lumi_engine *e)
     for (int shot = 0; shot < e->shots; shot++)
         for (int c = 0; c < e->config.camera_count; c++)
             if (engine_frame_at(e, shot, c)->at == AT_PLANNED)
-                engine_frame_lost(e, shot, c, e->account_shots[shot].state == SHOT_LOST ? "its shot was lost"
-                                                                                         : "its shot was not taken");
+                engine_frame_lost(e, shot, c,
+                                  e->account_shots[shot].state == SHOT_LOST ? "its shot was lost"
+                                                                            : "its shot was not taken");
 }
 
 bool engine_stage_drain(struct lumi_engine *e)

@@ -59,9 +59,8 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
     if (frame->gap)
         engine_incident(e, camera, "gap", "%s lost %u frames before number %llu", e->config.cameras[camera].name,
                         frame->gap, (unsigned long long)frame->sequence);
-    lumi_match_frame(c->match, &(struct lumi_match_frame){.device_ns = c->identity.device_clock
-                                                                           ? frame->device_ns
-                                                                           : LUMI_MATCH_NO_TIME,
+    lumi_match_frame(c->match, &(struct lumi_match_frame){.device_ns = c->identity.device_clock ? frame->device_ns
+                                                                                                : LUMI_MATCH_NO_TIME,
                                                           .host_ns = frame->host_ns,
                                                           .sequence = frame->sequence,
                                                           .gap = frame->gap,
@@ -170,8 +169,8 @@ static void take_dropped(struct lumi_engine *e, int camera, const struct lumi_ma
         return;
     engine_incident(e, camera, "dropped", "no frame of shot %d came from %s", result->shot,
                     e->config.cameras[camera].name);
-    engine_frame_lost(e, result->shot, camera, e->cameras[camera].there ? "its frame never came"
-                                                                         : "the camera was away");
+    engine_frame_lost(e, result->shot, camera,
+                      e->cameras[camera].there ? "its frame never came" : "the camera was away");
 }
 
 static void take_exposed(struct lumi_engine *e, int camera, const struct lumi_match_result *result)
@@ -250,8 +249,8 @@ void engine_match_options(const struct lumi_engine *e, int camera, struct lumi_m
     options->window = e->config.match_window;
     options->patience = e->config.frame_patience;
     options->device_clock = c->identity.device_clock;
-    options->edges = e->config.cameras[camera].sync_line ||
-                     (c->rig >= 0 && e->rig.control.triggers[c->rig].feedback >= 0);
+    options->edges =
+        e->config.cameras[camera].sync_line || (c->rig >= 0 && e->rig.control.triggers[c->rig].feedback >= 0);
 }
 
 void engine_match_begin(struct lumi_engine *e)

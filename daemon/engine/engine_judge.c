@@ -114,8 +114,8 @@ static void no_release(struct lumi_camera_frame *frame)
 /* Where the store has put it: the name with the extension that it finds. */
 static bool find_file(const struct lumi_engine *e, int shot, int camera, char *path, size_t size)
 {
-    static const char *const extensions[] = {".jpg", ".dng", ".tif", ".png", ".jpeg", ".tiff", ".cr2", ".cr3",
-                                             ".nef", ".arw", ".raf", ".rw2", ".gpr",  ".orf"};
+    static const char *const extensions[] = {".jpg", ".dng", ".tif", ".png", ".jpeg", ".tiff", ".cr2",
+                                             ".cr3", ".nef", ".arw", ".raf", ".rw2",  ".gpr",  ".orf"};
     const char *name = e->names[(size_t)shot * (size_t)e->config.camera_count + (size_t)camera];
 
     for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++) {
@@ -215,13 +215,13 @@ static void write_verdict(struct lumi_engine *e, const struct engine_judging *jo
     flight->job.frame = frame->row;
     flight->job.accepted = accepted;
     flight->job.sharpness = numbers ? numbers->sharpness : 0;
-    flight->job.judgement = (struct lumi_capture_judgement){NAN, NAN, NAN, NAN, NAN};
-    if (numbers)
-        flight->job.judgement = (struct lumi_capture_judgement){.blur_pixels = numbers->blur_pixels,
-                                                                .clipped = numbers->clipped,
-                                                                .exposure_stops = numbers->exposure_stops,
-                                                                .shift_pixels = numbers->shift_pixels,
-                                                                .moved = numbers->moved};
+    flight->job.judgement = (struct lumi_capture_judgement){.blur_pixels = numbers ? numbers->blur_pixels : NAN,
+                                                            .clipped = numbers ? numbers->clipped : NAN,
+                                                            .dark = numbers ? numbers->dark : NAN,
+                                                            .mean = numbers ? numbers->mean : NAN,
+                                                            .exposure_stops = numbers ? numbers->exposure_stops : NAN,
+                                                            .shift_pixels = numbers ? numbers->shift_pixels : NAN,
+                                                            .moved = numbers ? numbers->moved : NAN};
     snprintf(flight->job.text, sizeof flight->job.text, "%s", reason);
     engine_flight_give(e, flight);
 }

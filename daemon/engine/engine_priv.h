@@ -11,7 +11,8 @@
  * A capture goes through stages, one at a time; each stage's function is asked again whenever something has happened,
  * until it goes on to another stage.
  *
- * Cameras are counted as in the configuration everywhere in here; `cameras[c].rig` is the place in the rig's profile. */
+ * Cameras are counted as in the configuration everywhere in here; `cameras[c].rig` is the place in the rig's profile.
+ */
 #ifndef LUMI_DAEMON_ENGINE_ENGINE_PRIV_H
 #define LUMI_DAEMON_ENGINE_ENGINE_PRIV_H
 
@@ -343,8 +344,8 @@ bool engine_stage_seal(struct lumi_engine *e);
 bool engine_stage_close(struct lumi_engine *e);
 
 /* ---- engine_preflight.c ---- */
-void engine_check(struct lumi_engine *e, bool hard, enum lumi_verdict verdict, const char *name, const char *format, ...)
-    __attribute__((format(printf, 5, 6)));
+void engine_check(struct lumi_engine *e, bool hard, enum lumi_verdict verdict, const char *name, const char *format,
+                  ...) __attribute__((format(printf, 5, 6)));
 int engine_map_cameras(struct lumi_engine *e, struct lumi_error *error);
 int engine_parse_plan(struct lumi_engine *e, struct lumi_error *error);
 void engine_test_frame(struct lumi_engine *e, int camera, struct lumi_camera_frame *frame);

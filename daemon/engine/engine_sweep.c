@@ -273,8 +273,10 @@ bool engine_stage_sweep(struct lumi_engine *e)
         engine_wake(e, 1);
         if (engine_since(e, e->lost_ns) < e->config.rig_patience)
             return false;
-        engine_interrupt(e, true, "no word from the board for %.3g s; what it does now stands in its profile "
-                                  "(host-lost)", e->config.rig_patience);
+        engine_interrupt(e, true,
+                         "no word from the board for %.3g s; what it does now stands in its profile "
+                         "(host-lost)",
+                         e->config.rig_patience);
         return true;
     }
     if (e->ended)

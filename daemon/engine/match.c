@@ -63,8 +63,8 @@ bool lumi_match_expect(struct lumi_match *match, int64_t at_ns, double exposure_
         place--;
     memmove(match->exposures + place + 1, match->exposures + place,
             (size_t)(match->exposure_count - place) * sizeof *match->exposures);
-    match->exposures[place] = (struct match_exposure){
-        .at = at_ns, .length = exposure_s, .shot = shot, .frame_ns = LUMI_MATCH_NO_TIME};
+    match->exposures[place] =
+        (struct match_exposure){.at = at_ns, .length = exposure_s, .shot = shot, .frame_ns = LUMI_MATCH_NO_TIME};
     match->exposure_count++;
     if (match->last >= place)
         match->last++;
@@ -176,9 +176,8 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
             return counted;
         if (!overdue(match, frame, now, settle))
             return WAIT;
-        return frame->sequence > match->exposures[timed].sequence && latest(match, frame) > timed
-                   ? latest(match, frame)
-                   : TWICE;
+        return frame->sequence > match->exposures[timed].sequence && latest(match, frame) > timed ? latest(match, frame)
+                                                                                                  : TWICE;
     }
     if (timed >= 0 && (counted < 0 || counted == timed) && could_be(match, timed, frame))
         return timed;
@@ -296,8 +295,7 @@ static bool next_edge(struct lumi_match *match, struct lumi_match_result *result
             continue;
         struct match_exposure *e = match->exposures + near;
         *result = (struct lumi_match_result){.kind = LUMI_MATCH_EXPOSED, .shot = e->shot, .at_ns = match->edges[k]};
-        memmove(match->edges + k, match->edges + k + 1,
-                (size_t)(match->edge_count - k - 1) * sizeof *match->edges);
+        memmove(match->edges + k, match->edges + k + 1, (size_t)(match->edge_count - k - 1) * sizeof *match->edges);
         match->edge_count--;
         if (e->seen) {
             k--;
@@ -368,8 +366,8 @@ int64_t lumi_match_wake(const struct lumi_match *match)
         wake = match->frames[match->frame_count - 1].host_ns + (int64_t)(match->options.settle * 1e9);
     for (int i = 0; i < match->exposure_count; i++)
         if (!match->exposures[i].matched || !match->exposures[i].told) {
-            int64_t end = match->exposures[i].at +
-                          (int64_t)((match->options.patience + match->exposures[i].length) * 1e9) + 1000;
+            int64_t end =
+                match->exposures[i].at + (int64_t)((match->options.patience + match->exposures[i].length) * 1e9) + 1000;
             wake = end < wake ? end : wake;
             break;
         }

@@ -1,0 +1,291 @@
+/* What an operator wants. */
+#include "daemon/engine/engine_priv.h"
+#include "proto/base/memory.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static bool resting(const struct lumi_engine *e)
+{
+    return e->stage == STAGE_REST && !e->store;
+}
+
+static int copy_overrides(struct lumi_engine *e, const char *const *names, struct lumi_error *error)
+{
+    int count = 0;
+
+    for (int i = 0; i < e->override_count; i++)
+        lumi_free(e->override[i]);
+    lumi_free(e->override);
+    e->override = NULL;
+    e->override_count = 0;
+    while (names && names[count])
+        count++;
+    if (count == 0)
+        return LUMI_OK;
+    e->override = lumi_calloc((size_t)count, sizeof(char *));
+    if (!e->override)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory");
+    for (int i = 0; i < count; i++)
+        if ((e->override[i] = engine_copy(names[i])))
+            e->override_count = i + 1;
+        else
+            break;
+    return LUMI_OK;
+}
+
+static int check_name(const struct lumi_engine *e, const char *name, struct lumi_error *error)
+{
+    char path[1400];
+    struct stat status;
+
+    if (!name || !name[0])
+        return LUMI_OK;
+    if (name[0] == '.' || strlen(name) > 200 ||
+        strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") != strlen(name))
+        return lumi_fail(error, LUMI_ERR_ARG, "'%.60s' is no name for a capture: letters, digits, '.', '_', '-'", name);
+    snprintf(path, sizeof path, "%s/%s", e->config.folder, name);
+    if (!stat(path, &status))
+        return lumi_fail(error, LUMI_ERR_EXISTS, "%s: there is one already", path);
+    return LUMI_OK;
+}
+
+int lumi_engine_start(struct lumi_engine *e, int64_t now_ns, const char *plan_text, size_t plan_size,
+                      const struct lumi_engine_start *start, struct lumi_error *error)
+{
+    static const struct lumi_engine_start defaults = {0};
+    char *text;
+
+    start = start ? start : &defaults;
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (!resting(e))
+        return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way (%s)", lumi_engine_state_name(e->state));
+    if (plan_size > LUMI_PLAN_TEXT_MAX || memchr(plan_text, 0, plan_size))
+        return lumi_fail(error, LUMI_ERR_FORMAT, "the plan is longer than %d bytes, or no text", LUMI_PLAN_TEXT_MAX);
+    LUMI_TRY(check_name(e, start->name, error));
+    LUMI_TRY(copy_overrides(e, start->override, error));
+    text = lumi_calloc(plan_size + 1, 1);
+    if (!text)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory");
+    memcpy(text, plan_text, plan_size);
+    lumi_free(e->plan_text);
+    e->plan_text = text;
+    e->plan_known = false;
+    snprintf(e->name, sizeof e->name, "%s", start->name ? start->name : "");
+    snprintf(e->title, sizeof e->title, "%s", start->title ? start->title : "");
+    e->capture[0] = '\0';
+    e->preflight_only = start->preflight_only;
+    e->check_count = 0;
+    engine_account_free(e);
+    memset(e->at_count, 0, sizeof e->at_count);
+    for (int c = 0; c < LUMI_RIG_CAMERAS; c++)
+        engine_camera_reset(e, c);
+    engine_state(e, LUMI_ENGINE_PREFLIGHT, "looking whether all is well");
+    engine_go(e, STAGE_LINK);
+    engine_step(e);
+    return LUMI_OK;
+}
+
+static void set_session(struct lumi_engine *e, const char *value)
+{
+    struct engine_flight *flight = e->store ? engine_flight(e, LUMI_STORE_META) : NULL;
+
+    if (!flight)
+        return;
+    snprintf(flight->job.key, sizeof flight->job.key, "session");
+    snprintf(flight->job.text, sizeof flight->job.text, "%s", value);
+    engine_flight_give(e, flight);
+}
+
+int lumi_engine_pause(struct lumi_engine *e, int64_t now_ns, struct lumi_error *error)
+{
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (!engine_taking(e) || e->stage == STAGE_DRAIN || e->stage == STAGE_AFTER)
+        return lumi_fail(error, LUMI_ERR_BUSY, "there is no sweep to pause (%s)", lumi_engine_state_name(e->state));
+    set_session(e, "paused");
+    e->go_on = false;
+    if (e->stage == STAGE_SWEEP) {
+        e->want_pause = true;
+    } else {
+        e->pause = PAUSE_OPERATOR;
+        engine_go(e, STAGE_PAUSED);
+        engine_state(e, LUMI_ENGINE_PAUSED, "by the operator");
+    }
+    engine_step(e);
+    return LUMI_OK;
+}
+
+int lumi_engine_resume(struct lumi_engine *e, int64_t now_ns, struct lumi_error *error)
+{
+    char names[128];
+
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (e->stage == STAGE_DRAIN) { /* no more files will come */
+        for (int c = 0; c < e->config.camera_count; c++)
+            e->cameras[c].given_up |= e->cameras[c].identity.records_itself;
+        engine_step(e);
+        return LUMI_OK;
+    }
+    if (e->stage != STAGE_PAUSED && e->stage != STAGE_INTERRUPTED)
+        return lumi_fail(error, LUMI_ERR_BUSY, "there is nothing to resume (%s)", lumi_engine_state_name(e->state));
+    if (e->estop)
+        return lumi_fail(error, LUMI_ERR_BUSY, "the emergency stop is pressed");
+    if (e->faults & ~(1u << LUMI_RIG_FAULT_HOST_LOST)) {
+        engine_faults_text(e->faults, names, sizeof names);
+        return lumi_fail(error, LUMI_ERR_BUSY, "a fault stands: %s: look at the rig, clear, resume", names);
+    }
+    set_session(e, "taking");
+    e->tries = 0;
+    e->pause = PAUSE_NONE;
+    e->want_pause = false;
+    e->go_on = true;
+    if (e->stage != STAGE_INTERRUPTED) {
+        engine_go(e, STAGE_INTERRUPTED);
+        e->stage_ns = INT64_MIN; /* the board's status need not be newer */
+    } else {
+        e->stage_ns = INT64_MIN;
+    }
+    engine_state(e, LUMI_ENGINE_INTERRUPTED, "going on");
+    engine_step(e);
+    return LUMI_OK;
+}
+
+int lumi_engine_stop(struct lumi_engine *e, int64_t now_ns, bool at_once, bool seal, struct lumi_error *error)
+{
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (e->state == LUMI_ENGINE_PREFLIGHT) {
+        engine_ask_none(e);
+        e->test_camera = -1;
+        engine_rest(e, LUMI_ENGINE_IDLE);
+        engine_state(e, LUMI_ENGINE_IDLE, "stopped by the operator");
+        return LUMI_OK;
+    }
+    if (!engine_taking(e))
+        return lumi_fail(error, LUMI_ERR_BUSY, "there is nothing to stop (%s)", lumi_engine_state_name(e->state));
+    e->want_stop = true;
+    e->want_seal = seal;
+    e->stop_at_once = at_once;
+    if (e->stage != STAGE_SWEEP && e->stage != STAGE_PAUSED && e->stage != STAGE_INTERRUPTED &&
+        e->stage != STAGE_AFTER && e->stage != STAGE_DRAIN) {
+        if (!engine_board_rests(e) && e->connected) { /* homing, or about to start */
+            lumi_wire_Request request = {.which_command = lumi_wire_Request_stop_tag};
+            request.command.stop.at_once = at_once;
+            engine_send(e, &request);
+        }
+        e->moving = false;
+        engine_go(e, STAGE_DRAIN);
+    }
+    engine_step(e);
+    return LUMI_OK;
+}
+
+void lumi_engine_emergency_stop(struct lumi_engine *e, int64_t now_ns)
+{
+    e->now = now_ns > e->now ? now_ns : e->now;
+    e->ports.rig_emergency_stop(e->ports.context);
+    engine_incident(e, -1, "estop", "emergency stop");
+    if (e->driving && e->ports.drive_cancel)
+        e->ports.drive_cancel(e->ports.context);
+    engine_step(e);
+}
+
+int lumi_engine_clear(struct lumi_engine *e, int64_t now_ns, struct lumi_error *error)
+{
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_clear_tag};
+
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (!e->connected)
+        return lumi_fail(error, LUMI_ERR_IO, "the board is away");
+    request.command.clear.faults = e->link.status_known ? e->link.status.faults : e->faults;
+    engine_send(e, &request);
+    engine_step(e);
+    return LUMI_OK;
+}
+
+/* ---- retakes that somebody asks for ---- */
+
+static int choose(struct lumi_engine *e, const char *const *frames, struct lumi_error *error)
+{
+    const size_t all = (size_t)e->shots * (size_t)e->config.camera_count;
+
+    if (!frames || !frames[0])
+        return LUMI_OK;
+    e->chosen = lumi_calloc(all + 1, sizeof *e->chosen);
+    if (!e->chosen)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory");
+    for (int k = 0; frames[k]; k++) {
+        size_t i = 0;
+        while (i < all && (e->frames[i].at == AT_NONE || strcmp(e->names[i], frames[k])))
+            i++;
+        if (i == all)
+            return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: there is no frame '%.80s'", e->capture, frames[k]);
+        e->chosen[i] = true;
+    }
+    return LUMI_OK;
+}
+
+/* Named frames that are good are thrown out: that is what was asked for. */
+static void reject_chosen(struct lumi_engine *e)
+{
+    for (int shot = 0; e->chosen && shot < e->shots; shot++)
+        for (int c = 0; c < e->config.camera_count; c++) {
+            struct engine_frame *frame = engine_frame_at(e, shot, c);
+            struct engine_flight *flight;
+            if (!e->chosen[shot * e->config.camera_count + c] || (frame->at != AT_STORED && frame->at != AT_ACCEPTED) ||
+                !(flight = engine_flight(e, LUMI_STORE_JUDGED)))
+                continue;
+            frame->dead_row = true;
+            frame->judge_due = false;
+            engine_frame_go(e, shot, c, AT_REJECTED, "retake asked for");
+            flight->shot = shot;
+            flight->camera = c;
+            flight->job.frame = frame->row;
+            flight->job.judgement = (struct lumi_capture_judgement){NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+            snprintf(flight->job.text, sizeof flight->job.text, "retake asked for");
+            engine_flight_give(e, flight);
+        }
+}
+
+int lumi_engine_retake(struct lumi_engine *e, int64_t now_ns, const char *capture, const char *const *frames,
+                       struct lumi_error *error)
+{
+    struct lumi_error ignored;
+    char path[1400];
+    int code;
+
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (!resting(e))
+        return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way (%s)", lumi_engine_state_name(e->state));
+    if (!capture || !capture[0] || strchr(capture, '/') == capture)
+        snprintf(path, sizeof path, "%s", capture && capture[0] ? capture : e->capture);
+    else
+        snprintf(path, sizeof path, "%s/%s", e->config.folder, capture);
+    if (!path[0])
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "no capture is named, and none was taken");
+    for (int c = 0; c < LUMI_RIG_CAMERAS; c++)
+        engine_camera_reset(e, c);
+    LUMI_TRY(engine_reopen(e, path, error));
+    LUMI_GOTO(code, failed, choose(e, frames, error));
+    if (!e->chosen && engine_frames_needed(e) == 0) {
+        code = lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: nothing is missing or rejected", path);
+        goto failed;
+    }
+    reject_chosen(e);
+    e->round = 1;
+    e->retakes_left = e->config.retakes > 0 ? e->config.retakes - 1 : 0;
+    e->fresh = false;
+    engine_state(e, LUMI_ENGINE_INTERRUPTED, "retakes");
+    e->go_on = true;
+    engine_go(e, STAGE_INTERRUPTED);
+    e->stage_ns = INT64_MIN;
+    engine_step(e);
+    return LUMI_OK;
+failed:
+    engine_go(e, STAGE_CLOSE);
+    e->stage_at = 1;
+    (void)ignored;
+    engine_step(e);
+    return code;
+}

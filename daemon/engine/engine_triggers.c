@@ -1,0 +1,215 @@
+/* A test shot on every trigger: does the right camera see it? It also says where each camera's clock stands and how
+ * long its frames take, and gives a frame to look at. */
+#include "daemon/engine/engine_priv.h"
+#include "proto/base/memory.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define TEST_SECONDS 3.0   /* until a frame of a test shot is not seen */
+#define OTHERS_SECONDS 0.3 /* that others may answer too */
+#define TEST_AHEAD 0.002   /* s, from the board's answer to the first edge (firing.h, FIRING_MARGIN_TICKS) */
+#define BUSY_TRIES 20
+
+static void check(struct lumi_engine *e, int camera, enum lumi_verdict verdict, const char *what, const char *text)
+{
+    char name[48];
+
+    snprintf(name, sizeof name, "%s %.30s", what, e->config.cameras[camera].name);
+    engine_check(e, false, verdict, name, "%s", text);
+}
+
+void engine_test_frame(struct lumi_engine *e, int camera, struct lumi_camera_frame *frame)
+{
+    struct engine_camera *c = e->cameras + camera;
+    struct engine_held *held;
+
+    if (e->test_camera < 0 || e->test_ns == 0) { /* nothing was fired */
+        lumi_camera_frame_release(frame);
+        return;
+    }
+    e->cameras[e->test_camera].seen |= 1u << camera;
+    if (camera != e->test_camera || c->test || !(held = lumi_calloc(1, sizeof *held))) {
+        lumi_camera_frame_release(frame);
+        return;
+    }
+    *held = (struct engine_held){.frame = frame, .users = 1, .bytes = frame->size};
+    c->test = held;
+    c->frame_bytes = frame->size;
+    const struct lumi_rig_trigger *trigger = &e->rig.control.triggers[c->rig];
+    int64_t exposed = e->test_ns + (int64_t)((TEST_AHEAD + trigger->focus_lead + trigger->shutter_lag) * 1e9);
+    if (c->match && !c->identity.records_itself)
+        lumi_match_prior(
+            c->match,
+            &(struct lumi_match_frame){.device_ns = c->identity.device_clock ? frame->device_ns : LUMI_MATCH_NO_TIME,
+                                       .host_ns = frame->host_ns,
+                                       .sequence = frame->sequence},
+            exposed);
+}
+
+void engine_test_judged(struct lumi_engine *e, int camera, int code, const char *text,
+                        const struct lumi_judge_numbers *numbers)
+{
+    char reason[256];
+
+    if (code != LUMI_OK || !numbers) {
+        snprintf(reason, sizeof reason, "the test frame cannot be judged: %.180s", text ? text : "");
+        check(e, camera, code == LUMI_ERR_FORMAT ? LUMI_RED : LUMI_YELLOW, "focus", reason);
+        return;
+    }
+    snprintf(reason, sizeof reason, "sharpness %.3f", numbers->sharpness);
+    check(e, camera, numbers->sharpness < 0.05 ? LUMI_YELLOW : LUMI_GREEN, "focus", reason);
+    snprintf(reason, sizeof reason, "%.1f %% at white, %.1f %% at black, mean %.3f", numbers->clipped * 100,
+             numbers->dark * 100, numbers->mean);
+    check(e, camera, numbers->clipped > e->config.judge.clipped || numbers->mean < 0.005 ? LUMI_YELLOW : LUMI_GREEN,
+          "light", reason);
+}
+
+static void tell_seen(struct lumi_engine *e, int camera)
+{
+    const struct engine_camera *c = e->cameras + camera;
+    const uint32_t others = c->seen & ~(1u << camera);
+    char text[200], names[128] = "";
+    size_t used = 0;
+
+    for (int k = 0; k < e->config.camera_count; k++)
+        if (others & 1u << k && used + LUMI_RIG_NAME + 3 < sizeof names)
+            used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "",
+                                     e->config.cameras[k].name);
+    if (c->seen & 1u << camera && !others) {
+        snprintf(text, sizeof text, "seen, %zu bytes", c->frame_bytes);
+        check(e, camera, LUMI_GREEN, "trigger", text);
+    } else if (c->seen & 1u << camera) {
+        snprintf(text, sizeof text, "%s fired as well", names);
+        check(e, camera, LUMI_RED, "trigger", text);
+    } else if (others) {
+        snprintf(text, sizeof text, "its trigger fires %s: miswired, or two cameras are exchanged", names);
+        check(e, camera, LUMI_RED, "trigger", text);
+    } else {
+        check(e, camera, LUMI_RED, "trigger", "no frame came of its trigger");
+    }
+}
+
+static bool testable(struct lumi_engine *e, int camera)
+{
+    const struct engine_camera *c = e->cameras + camera;
+
+    if (!c->used || !engine_camera_ready(e, camera))
+        return false;
+    if (c->identity.records_itself) {
+        check(e, camera, LUMI_YELLOW, "trigger", "it records by itself: what it took is seen after the sweep");
+        return false;
+    }
+    if (e->config.cameras[camera].setting.trigger != LUMI_TRIGGER_HARDWARE) {
+        check(e, camera, LUMI_YELLOW, "trigger", "it is not set to be fired by the board");
+        return false;
+    }
+    return true;
+}
+
+static void fire(struct lumi_engine *e)
+{
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_test_triggers_tag};
+
+    request.command.test_triggers.cameras = 1u << e->cameras[e->test_camera].rig;
+    request.command.test_triggers.exposure = e->plan.exposures[0];
+    e->test_ns = 0;
+    engine_ask(e, &request);
+}
+
+/* The next camera's turn; false: all have had theirs. */
+static bool next_camera(struct lumi_engine *e)
+{
+    while (++e->test_camera < e->config.camera_count)
+        if (testable(e, e->test_camera))
+            return true;
+    return false;
+}
+
+static void judge_tests(struct lumi_engine *e)
+{
+    for (int c = 0; c < e->config.camera_count; c++) {
+        struct engine_held *held = e->cameras[c].test;
+        struct engine_judging *job = NULL;
+        e->cameras[c].test = NULL;
+        for (int i = 0; held && e->ports.judge && i < ENGINE_JUDGING && !job; i++)
+            job = e->jobs[i].used ? NULL : &e->jobs[i];
+        if (!job || !e->config.judging) {
+            engine_held_drop(held);
+            continue;
+        }
+        *job = (struct engine_judging){.used = true, .id = ++e->judge_serial, .shot = -1, .camera = c, .held = held};
+        struct lumi_engine_judge_job asked = {.id = job->id,
+                                              .camera = c,
+                                              .frame = held->frame,
+                                              .lens = &e->rig.lenses[e->rig.cameras[e->cameras[c].rig].lens].lens,
+                                              .exposure_s = e->plan.exposures[0],
+                                              .gain = held->frame->gain};
+        asked.pose = (struct lumi_pose){.r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+        e->judging++;
+        e->ports.judge(e->ports.context, &asked);
+    }
+}
+
+static bool answered(struct lumi_engine *e)
+{
+    if (e->ask.code == LUMI_ERR_BUSY && e->stage_at++ < BUSY_TRIES) { /* the one before is still going on */
+        engine_ask_none(e);
+        engine_wake(e, 0.2);
+        e->test_ns = 0;
+        e->stage_ns = e->now;
+        return false;
+    }
+    if (e->ask.code != LUMI_OK) {
+        check(e, e->test_camera, LUMI_RED, "trigger", e->ask.text);
+        return true;
+    }
+    if (e->test_ns == 0)
+        e->test_ns = e->now;
+    const struct engine_camera *c = e->cameras + e->test_camera;
+    const double waited = engine_since(e, e->test_ns), exposure = e->plan.exposures[0];
+    if (waited < TEST_SECONDS + exposure && !(c->seen & 1u << e->test_camera && waited > OTHERS_SECONDS)) {
+        engine_wake(e, 0.05);
+        return false;
+    }
+    tell_seen(e, e->test_camera);
+    return true;
+}
+
+bool engine_stage_triggers(struct lumi_engine *e)
+{
+    if (e->stage_at == 0) {
+        e->stage_at = 1;
+        e->test_camera = -1;
+        if (e->faults || e->estop || !next_camera(e)) {
+            e->test_camera = -1;
+            engine_go(e, STAGE_VERDICT);
+            return true;
+        }
+    }
+    if (e->test_camera < e->config.camera_count) {
+        if (!engine_asked(e)) {
+            if (engine_since(e, e->stage_ns) < 0.2 && e->stage_at > 1) {
+                engine_wake(e, 0.2);
+                return false;
+            }
+            fire(e);
+            return false;
+        }
+        if (!e->ask.answered || !answered(e))
+            return false;
+        engine_ask_none(e);
+        e->stage_at = 1;
+        if (next_camera(e)) {
+            fire(e);
+            return false;
+        }
+        judge_tests(e);
+    }
+    if (e->judging > 0)
+        return false;
+    e->test_camera = -1;
+    engine_go(e, STAGE_VERDICT);
+    return true;
+}
