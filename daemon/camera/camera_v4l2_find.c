@@ -52,7 +52,9 @@ static void identify(struct udev_device *device, const struct v4l2_capability *c
     text(identity->vendor, sizeof identity->vendor, usb ? udev_device_get_sysattr_value(usb, "manufacturer") : NULL);
     if (!identity->vendor[0])
         text(identity->vendor, sizeof identity->vendor, (const char *)capability->driver);
-    text(identity->model, sizeof identity->model, (const char *)capability->card);
+    text(identity->model, sizeof identity->model, usb ? udev_device_get_sysattr_value(usb, "product") : NULL);
+    if (!identity->model[0])
+        text(identity->model, sizeof identity->model, (const char *)capability->card);
     if (usb)
         text(identity->firmware, sizeof identity->firmware, udev_device_get_sysattr_value(usb, "bcdDevice"));
     else
