@@ -34,6 +34,15 @@ void cli_progress(const char *what, long done, long total)
     shown = true;
 }
 
+void cli_progress_line(const char *line)
+{
+    if (!isatty(STDERR_FILENO))
+        return;
+    fprintf(stderr, "\r\033[K%s", line);
+    fflush(stderr);
+    shown = true;
+}
+
 void cli_progress_end(void)
 {
     if (shown)

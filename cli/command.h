@@ -29,6 +29,7 @@ int cli_no_command(const char *word, struct lumi_error *error);
 /* Progress on a terminal, silent in a pipe: redraws one line on standard error. total ≤ 0: no percentage.
  * cli_progress_end clears the line. */
 void cli_progress(const char *what, long done, long total);
+void cli_progress_line(const char *line); /* the same with words of one's own */
 void cli_progress_end(void);
 
 /* "WxH", "A:B" and the like: reads `count` numbers separated by `separator`; LUMI_ERR_ARG names the option. */

@@ -1,7 +1,7 @@
 /* The API's server: who may ask, what is asked for, and life.
  *
  * A service on localhost is within reach of every page that a browser on this computer shows. So, where no token is
- * asked for: the Host header must name this computer (a foreign name that was made to lead to 127.0.0.1 does not), and
+ * shown: the Host header must name this computer (a foreign name that was made to lead to 127.0.0.1 does not), and
  * always: a request that says it comes from another origin is refused, and a body must be JSON by its type, which no
  * form can send. */
 #include "daemon/http/api_priv.h"
@@ -19,6 +19,25 @@ void lumi_http_options_init(struct lumi_http_options *options)
 
 /* ---- who may ask ---- */
 
+static bool is_from_here(SoupServerMessage *message)
+{
+    GSocketAddress *address = soup_server_message_get_remote_address(message);
+
+    return address && G_IS_INET_SOCKET_ADDRESS(address) &&
+           g_inet_address_get_is_loopback(g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(address)));
+}
+
+/* NULL: no token, but none is needed either. */
+static const char *token_problem(struct lumi_http *http, SoupServerMessage *message, bool *shown)
+{
+    const char *given = soup_message_headers_get_one(soup_server_message_get_request_headers(message), "Authorization");
+
+    *shown = http->options.token && given && lumi_api_token_matches(given, http->options.token);
+    if (*shown || !http->options.token || (!given && !http->options.token_everywhere && is_from_here(message)))
+        return NULL;
+    return given ? "the token is wrong" : "a token is needed (Authorization: Bearer TOKEN)";
+}
+
 /* True: it is answered already. */
 static bool refused(struct lumi_http *http, SoupServerMessage *message)
 {
@@ -26,24 +45,21 @@ static bool refused(struct lumi_http *http, SoupServerMessage *message)
     const char *host = soup_message_headers_get_one(headers, "Host");
     const char *origin = soup_message_headers_get_one(headers, "Origin");
     const char *site = soup_message_headers_get_one(headers, "Sec-Fetch-Site");
+    bool shown;
+    const char *problem = token_problem(http, message, &shown);
 
-    if (!http->options.token && !lumi_api_host_is_local(host)) {
-        lumi_api_problem(message, 421, "host", "this server answers to localhost, 127.0.0.1 and [::1] only");
-        return true;
-    }
-    if ((origin && !lumi_api_origin_is_own(origin, http->https ? "https" : "http", host)) ||
-        (site && strcmp(site, "same-origin") && strcmp(site, "none"))) {
-        lumi_api_problem(message, 403, "origin", "requests of other sites' pages are not answered");
-        return true;
-    }
-    if (http->options.token &&
-        !lumi_api_token_matches(soup_message_headers_get_one(headers, "Authorization"), http->options.token)) {
+    if (problem) {
         soup_message_headers_replace(soup_server_message_get_response_headers(message), "WWW-Authenticate",
                                      "Bearer realm=\"lumid\"");
-        lumi_api_problem(message, 401, "token", "the token is missing or wrong (Authorization: Bearer TOKEN)");
-        return true;
-    }
-    return false;
+        lumi_api_problem(message, 401, "token", problem);
+    } else if (!shown && !lumi_api_host_is_local(host))
+        lumi_api_problem(message, 421, "host", "without a token only localhost, 127.0.0.1 and [::1] are answered to");
+    else if ((origin && !lumi_api_origin_is_own(origin, http->https ? "https" : "http", host)) ||
+             (site && strcmp(site, "same-origin") && strcmp(site, "none")))
+        lumi_api_problem(message, 403, "origin", "requests of other sites' pages are not answered");
+    else
+        return false;
+    return true;
 }
 
 /* When the headers are here and nothing of the body is. */

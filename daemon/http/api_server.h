@@ -9,8 +9,9 @@
 
 struct lumi_http;
 struct lumi_http_options {
-    const char *listen; /* "localhost:8470" by default: both loopback addresses; "ADDRESS:PORT", port 0: any */
-    const char *token;  /* asked of everybody, and needed for all but loopback addresses; NULL: loopback, without one */
+    const char *listen;    /* "localhost:8470" by default: both loopback addresses; "ADDRESS:PORT", port 0: any */
+    const char *token;     /* asked of all but this computer; NULL: loopback addresses only */
+    bool token_everywhere; /* asked of this computer too, which others may share */
     const char *certificate, *key; /* PEM files; NULL: plain HTTP. Both in one file where key is NULL */
     const char *folder;            /* where captures are kept, for /api/v1/captures; may be NULL */
     size_t body_max;               /* of a request (1 MiB) */

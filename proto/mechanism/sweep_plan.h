@@ -50,6 +50,12 @@ struct lumi_plan {
 /* One turn count, 72 positions, 30 s, continuous, one exposure of 1/250 s, all cameras: what `rig` is meant for. */
 void lumi_plan_init(struct lumi_plan *plan, const struct lumi_rig *rig);
 
+/* Plans to begin with, for a rig that can do them (otherwise as lumi_plan_check says): "turn" (lumi_plan_init), "slow"
+ * (twice its time and exposure), "still" (start-stop, 1/60 s, as fast as the rig can), "hdr" (the same with -2, 0 and
+ * +2 stops). LUMI_ERR_NOTFOUND: there is none of this name. */
+extern const char *const lumi_plan_builtin_names[]; /* NULL-terminated */
+int lumi_plan_builtin(const char *name, const struct lumi_rig *rig, struct lumi_plan *plan, struct lumi_error *error);
+
 /* Whether this rig can do it: LUMI_ERR_FORMAT with the reason (outruns the motor, the cameras or the positions' time;
  * blurs; more turns than string; drop with a brake that holds; too many shots). For a rig that passed lumi_rig_check;
  * what follows is for plans that passed this. */

@@ -154,12 +154,18 @@ static void a_foreign_page_is_refused(void **state)
     expect(fixture_ask(*state, "GET", "/api/v1/status", "Host: [::1]:8470\r\n", NULL), 200, NULL);
 }
 
-static void a_token_is_asked_of_everybody(void **state)
+static void a_token_is_asked_of_all_but_this_computer(void **state)
 {
     struct fixture *fixture = *state;
 
     lumi_http_stop(fixture->http);
     fixture->options.token = "s3cret";
+    fixture_start(fixture);
+    expect(fixture_ask(fixture, "GET", "/api/v1/status", NULL, NULL), 200, NULL);
+    expect(fixture_ask(fixture, "GET", "/api/v1/status", "Host: rig.local\r\n", NULL), 421, NULL);
+    expect(fixture_ask(fixture, "GET", "/api/v1/status", "Authorization: Bearer wrong\r\n", NULL), 401, "is wrong");
+    lumi_http_stop(fixture->http);
+    fixture->options.token_everywhere = true;
     fixture_start(fixture);
     struct answer answer = fixture_ask(fixture, "GET", "/api/v1/status", NULL, NULL);
     assert_non_null(strstr(answer.head, "WWW-Authenticate: Bearer"));
@@ -272,7 +278,7 @@ int main(void)
         CASE(what_the_engine_refuses_is_said_in_its_words),
         CASE(every_wish_reaches_the_engine),
         CASE(a_foreign_page_is_refused),
-        CASE(a_token_is_asked_of_everybody),
+        CASE(a_token_is_asked_of_all_but_this_computer),
         CASE(others_reach_it_only_with_a_token),
         CASE(a_gigabyte_is_refused_before_it_is_read),
         CASE(devices_are_looked_for_beside_the_loop),
