@@ -8,6 +8,7 @@
 
 #define FLIGHTS_AT_ONCE 256
 #define HOME_SECONDS 1800.0
+#define STATUS_SECONDS 10.0
 #define ARM_SECONDS 10.0
 
 void engine_take(struct lumi_engine *e)
@@ -102,9 +103,10 @@ static bool ask_home(struct lumi_engine *e)
 
 bool engine_stage_home(struct lumi_engine *e)
 {
-    if (!e->connected || !e->link.status_known) {
+    /* What it said before this stage may be of a sweep that has ended since. */
+    if (!e->connected || !e->link.status_known || (!engine_asked(e) && (int64_t)e->link.status_ns <= e->stage_ns)) {
         engine_wake(e, 0.5);
-        if (engine_since(e, e->stage_ns) < 10)
+        if (engine_since(e, e->stage_ns) < STATUS_SECONDS)
             return false;
         engine_interrupt(e, true, "the board is away");
         return true;

@@ -23,6 +23,7 @@ int lumi_match_create(const struct lumi_match_options *options, struct lumi_matc
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for matching frames");
     }
     m->options = *options;
+    m->last = NULL_EXPOSURE;
     *match = m;
     return LUMI_OK;
 }
@@ -41,6 +42,7 @@ void lumi_match_sweep(struct lumi_match *match, const struct lumi_match_options 
     match->counts = (struct lumi_match_clock){0};
     match->residual_sum = 0;
     match->residual_count = 0;
+    match->finished = false;
 }
 
 void lumi_match_restart(struct lumi_match *match)

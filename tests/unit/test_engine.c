@@ -1,0 +1,273 @@
+/* The capture engine on its bench: whole captures, and what goes wrong in them one thing at a time. */
+#include "engine_bench.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+/* after those */
+#include <cmocka.h>
+
+static void assert_sealed_whole(struct bench *b)
+{
+    struct lumi_verify_result result;
+    struct lumi_error error = {0};
+
+    assert_int_equal(lumi_capture_verify(b->status.capture, NULL, NULL, NULL, &result, &error), LUMI_OK);
+    assert_true(result.sealed);
+    assert_int_equal(result.problems, 0);
+}
+
+static void a_sweep_ends_as_a_sealed_capture_with_every_frame(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.status.accepted, 8);
+    assert_int_equal(b.status.missing, 0);
+    assert_int_equal(b.starts, 1);
+    assert_int_equal(b.homes, 1);
+    assert_string_equal(b.handed, b.status.capture);
+    assert_int_equal(b.stored, b.event_number); /* every event of the board was acknowledged */
+    assert_int_equal(b.frames_out, 0);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void a_frame_that_never_comes_is_taken_again(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    b.flaws[2][1] = BENCH_NO_FRAME;
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.status.round, 1);
+    assert_int_equal(b.starts, 2);
+    assert_int_equal(b.status.cameras[0].surplus, 1); /* its frame of that shot was good */
+    assert_int_equal(b.frames_out, 0);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void late_doubled_damaged_and_wrongly_exposed_frames_are_found(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    b.flaws[0][0] = BENCH_TWICE;
+    b.flaws[1][1] = BENCH_LATE;
+    b.flaws[2][0] = BENCH_DAMAGED;
+    b.flaws[3][1] = BENCH_EXPOSURE;
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DRAINING, 200));
+    assert_int_equal(bench_status(&b)->cameras[0].doubled, 1);
+    assert_int_equal(b.status.cameras[1].late, 1);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.status.round, 1);
+    assert_int_equal(b.frames_out, 0);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void a_frame_that_is_judged_bad_is_taken_again(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_START_STOP, 1);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_SWEEPING, 100));
+    b.verdict_rejects = 1;
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.status.accepted, 8);
+    assert_int_equal(b.status.round, 1);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void exchanged_trigger_wires_are_red_and_start_nothing(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    b.exchanged = true;
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_RED, 100));
+    assert_non_null(bench_check(&b, "trigger c00"));
+    assert_int_equal(bench_check(&b, "trigger c00")->verdict, LUMI_RED);
+    assert_non_null(strstr(bench_check(&b, "trigger c00")->reason, "c01"));
+    assert_int_equal(b.starts, 0);
+    bench_end(&b);
+}
+
+static void exposures_of_a_bracket_are_told_to_the_cameras(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_START_STOP, 3);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 400));
+    assert_true(b.told_exposures >= 22); /* between each two of twelve shots, both */
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.status.accepted, 24);
+    assert_int_equal(b.status.round, 0);
+    bench_end(&b);
+}
+
+static void a_killed_program_goes_on_where_it_was(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+    bool found;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    while (bench_status(&b)->stored + b.status.accepted < 3)
+        bench_run(&b, 0.01);
+    bench_kill(&b);
+    b.state = lumi_wire_State_IDLE;
+    bench_engine(&b);
+    assert_int_equal(lumi_engine_recover(b.engine, b.now, &found, &error), LUMI_OK);
+    assert_true(found);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.frames_out, 0);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void a_board_that_restarts_is_homed_and_told_what_is_done(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    while (bench_status(&b)->fired < 2)
+        bench_run(&b, 0.01);
+    bench_restart_board(&b);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.homes, 2);
+    assert_int_equal(b.starts, 2);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void nothing_goes_on_while_a_fault_stands(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+    lumi_wire_Event event = {.which_kind = lumi_wire_Event_sweep_ended_tag};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    while (bench_status(&b)->fired < 2)
+        bench_run(&b, 0.01);
+    bench_stand_still(&b);
+    b.faults = 1u << LUMI_RIG_FAULT_SLACK;
+    event.kind.sweep_ended.how = lumi_wire_SweepEnded_How_FAULTED;
+    b.state = lumi_wire_State_IDLE;
+    bench_event(&b, &event);
+    assert_true(bench_until(&b, LUMI_ENGINE_INTERRUPTED, 100));
+    bench_run(&b, 60);
+    assert_int_equal(bench_status(&b)->state, LUMI_ENGINE_INTERRUPTED);
+    assert_int_equal(lumi_engine_resume(b.engine, b.now, &error), LUMI_ERR_BUSY);
+    assert_non_null(strstr(error.text, "slack"));
+    assert_int_equal(lumi_engine_clear(b.engine, b.now, &error), LUMI_OK);
+    bench_run(&b, 2);
+    assert_int_equal(lumi_engine_resume(b.engine, b.now, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
+    assert_true(bench_status(&b)->complete);
+    bench_end(&b);
+}
+
+static void a_full_disk_loses_nothing(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_START_STOP, 1);
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_SWEEPING, 100));
+    b.disk_full = true;
+    bench_run(&b, 30);
+    assert_int_not_equal(bench_status(&b)->state, LUMI_ENGINE_DONE);
+    assert_int_equal(b.status.accepted, 0);
+    b.disk_full = false;
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
+    assert_true(bench_status(&b)->complete);
+    assert_int_equal(b.frames_out, 0);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+static void a_capture_that_was_stopped_says_what_is_missing(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+    struct lumi_engine_missing missing[8];
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    b.config.retakes = 0;
+    lumi_engine_destroy(b.engine);
+    bench_engine(&b);
+    b.flaws[1][0] = BENCH_NO_FRAME;
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_false(bench_status(&b)->complete);
+    assert_int_equal(lumi_engine_missing(b.engine, missing, 8), 1);
+    assert_int_equal(missing[0].shot, 1);
+    assert_string_equal(missing[0].camera, "c00");
+    assert_non_null(strstr(missing[0].reason, "never came"));
+    assert_string_equal(b.handed, "");
+    /* And somebody takes it, though the capture is sealed. */
+    assert_int_equal(lumi_engine_retake(b.engine, b.now, NULL, NULL, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_true(bench_status(&b)->complete);
+    assert_string_equal(b.handed, b.status.capture);
+    assert_sealed_whole(&b);
+    bench_end(&b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sweep_ends_as_a_sealed_capture_with_every_frame),
+        cmocka_unit_test(a_frame_that_never_comes_is_taken_again),
+        cmocka_unit_test(late_doubled_damaged_and_wrongly_exposed_frames_are_found),
+        cmocka_unit_test(a_frame_that_is_judged_bad_is_taken_again),
+        cmocka_unit_test(exchanged_trigger_wires_are_red_and_start_nothing),
+        cmocka_unit_test(exposures_of_a_bracket_are_told_to_the_cameras),
+        cmocka_unit_test(a_killed_program_goes_on_where_it_was),
+        cmocka_unit_test(a_board_that_restarts_is_homed_and_told_what_is_done),
+        cmocka_unit_test(nothing_goes_on_while_a_fault_stands),
+        cmocka_unit_test(a_full_disk_loses_nothing),
+        cmocka_unit_test(a_capture_that_was_stopped_says_what_is_missing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
