@@ -10,6 +10,7 @@
 #include <string.h>
 
 #define RETRY_SECONDS 2.0
+#define SOFTWARE_LATEST 0.5 /* s after a shot that a camera without a line is still fired for it */
 
 /* ---- frames ---- */
 
@@ -326,6 +327,17 @@ static void expect(struct lumi_engine *e, int shot, int camera, int64_t begin_ns
     engine_frame_lost(e, shot, camera, "the time of its exposure is not known");
 }
 
+/* A camera without a line from the board is fired now, if it is still the time of the shot: a start-stop sweep stands
+ * until the next position is due. Returns when the exposure begins. */
+static int64_t fired_by_software(struct lumi_engine *e, int camera, int64_t begin_ns)
+{
+    if (e->config.cameras[camera].setting.trigger != LUMI_TRIGGER_SOFTWARE || begin_ns == LUMI_NO_TIME ||
+        engine_since(e, begin_ns) > SOFTWARE_LATEST)
+        return begin_ns;
+    engine_camera_do(e, camera, LUMI_CAMERA_TRIGGER, e->cameras[camera].exposure_s);
+    return e->now;
+}
+
 void engine_shot_fired(struct lumi_engine *e, int shot, const int64_t *begin_ns, uint32_t cameras, uint64_t event)
 {
     struct engine_flight *flight = engine_flight(e, LUMI_STORE_SHOT);
@@ -372,7 +384,7 @@ void engine_shot_fired(struct lumi_engine *e, int shot, const int64_t *begin_ns,
     }
     for (int c = 0; c < e->config.camera_count; c++)
         if (cameras & 1u << c && engine_frame_at(e, shot, c)->at == AT_TRIGGERED)
-            expect(e, shot, c, begin_ns[c]);
+            expect(e, shot, c, fired_by_software(e, c, begin_ns[c]));
 }
 
 /* The next exposure of a bracket, told to the cameras that can be told. */

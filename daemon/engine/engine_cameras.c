@@ -24,7 +24,7 @@ void engine_camera_do(struct lumi_engine *e, int camera, enum lumi_camera_comman
     struct engine_camera *c = e->cameras + camera;
     struct lumi_camera_command command = {.kind = kind, .setting = e->config.cameras[camera].setting};
 
-    if (command.setting.exposure_s <= 0)
+    if (command.setting.exposure_s <= 0 && c->identity.exposure_control)
         command.setting.exposure_s = exposure_s;
     command.exposure_s = exposure_s;
     command.gain = command.setting.gain;

@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TELL_BY_NAME 20 /* incidents of one kind and camera that are told one by one */
+#define FREE_PERIOD (1.0 / 30) /* s, of a free-running camera's frames before it is measured */
+#define FREE_SETTLE 0.3        /* s, that they are kept for a shot that is not known yet */
+#define TELL_BY_NAME 20        /* incidents of one kind and camera that are told one by one */
 
 /* ---- coming in ---- */
 
@@ -56,7 +58,7 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
         keep_file(e, camera, held);
         return;
     }
-    if (frame->gap)
+    if (frame->gap && e->config.cameras[camera].setting.trigger != LUMI_TRIGGER_FREE)
         engine_incident(e, camera, "gap", "%s lost %u frames before number %llu", e->config.cameras[camera].name,
                         frame->gap, (unsigned long long)frame->sequence);
     lumi_match_frame(c->match, &(struct lumi_match_frame){.device_ns = c->identity.device_clock ? frame->device_ns
@@ -201,7 +203,9 @@ static void take_result(struct lumi_engine *e, int camera, const struct lumi_mat
         engine_held_drop(result->frame);
         break;
     case LUMI_MATCH_SURPLUS:
-        if (e->cameras[camera].surplus++ < TELL_BY_NAME)
+        if (e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_FREE)
+            ; /* as most of them */
+        else if (e->cameras[camera].surplus++ < TELL_BY_NAME)
             engine_incident(e, camera, "surplus", "a frame of no shot came from %s", name);
         engine_held_drop(result->frame);
         break;
@@ -249,6 +253,12 @@ void engine_match_options(const struct lumi_engine *e, int camera, struct lumi_m
     options->window = e->config.match_window;
     options->patience = e->config.frame_patience;
     options->device_clock = c->identity.device_clock;
+    if (e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_FREE) {
+        const double rate = e->config.cameras[camera].setting.frame_rate;
+        options->period = rate > 0 ? 1 / rate : FREE_PERIOD;
+        options->settle = FREE_SETTLE;
+        options->device_clock = c->identity.device_clock && c->identity.monotonic_clock;
+    }
     options->edges =
         e->config.cameras[camera].sync_line || (c->rig >= 0 && e->rig.control.triggers[c->rig].feedback >= 0);
 }

@@ -102,7 +102,15 @@ static bool testable(struct lumi_engine *e, int camera)
         return false;
     }
     if (e->config.cameras[camera].setting.trigger != LUMI_TRIGGER_HARDWARE) {
-        check(e, camera, LUMI_YELLOW, "trigger", "it is not set to be fired by the board");
+        const bool free_running = e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_FREE;
+        if (e->plan.mode != LUMI_PLAN_START_STOP)
+            check(e, camera, LUMI_RED, "trigger",
+                  free_running ? "it is free-running: the platform must stand at every position"
+                               : "it is fired by software: the platform must stand at every position");
+        else
+            check(e, camera, LUMI_GREEN, "trigger",
+                  free_running ? "free-running: of each shot the frame about its time is kept"
+                               : "fired by software when the board has fired");
         return false;
     }
     return true;

@@ -6,6 +6,8 @@
 #include <string.h>
 
 #define LATE_LEAST 0.25 /* s over the usual delay until a frame is called late */
+#define PERIOD_NEW 0.2  /* share of a new interval in the period of frames that come by themselves */
+#define PERIOD_MOST_NS 2e9
 
 void lumi_match_options_init(struct lumi_match_options *options)
 {
@@ -24,6 +26,7 @@ int lumi_match_create(const struct lumi_match_options *options, struct lumi_matc
     }
     m->options = *options;
     m->last = NULL_EXPOSURE;
+    m->period = options->period;
     *match = m;
     return LUMI_OK;
 }
@@ -39,6 +42,7 @@ void lumi_match_destroy(struct lumi_match *match)
 void lumi_match_sweep(struct lumi_match *match, const struct lumi_match_options *options)
 {
     match->options = *options;
+    match->period = options->period > 0 && match->period > 0 ? match->period : options->period;
     match->counts = (struct lumi_match_clock){0};
     match->residual_sum = 0;
     match->residual_count = 0;
@@ -81,8 +85,23 @@ void lumi_match_edge(struct lumi_match *match, int64_t at_ns)
     match->edges[match->edge_count++] = at_ns;
 }
 
+/* How often they come: by the camera's clock and count where there are any. */
+static void measure_period(struct lumi_match *match, const struct lumi_match_frame *frame)
+{
+    const struct lumi_match_frame *before = &match->before;
+    const bool device = frame->device_ns != LUMI_MATCH_NO_TIME && before->device_ns != LUMI_MATCH_NO_TIME;
+    const int64_t apart = device ? frame->device_ns - before->device_ns : frame->host_ns - before->host_ns;
+    const uint64_t frames = frame->sequence > before->sequence ? frame->sequence - before->sequence : 1;
+
+    if (before->tag && apart > 0 && apart < (int64_t)PERIOD_MOST_NS)
+        match->period += PERIOD_NEW * ((double)apart * 1e-9 / (double)frames - match->period);
+    match->before = *frame;
+}
+
 void lumi_match_frame(struct lumi_match *match, const struct lumi_match_frame *frame)
 {
+    if (match->period > 0)
+        measure_period(match, frame);
     if (match->frame_count == LUMI_MATCH_FRAMES) /* out of next's way: it is of no exposure that is known */
         match->overflow = true;
     if (match->frame_count < MATCH_WAITING)
@@ -93,6 +112,8 @@ void lumi_match_frame(struct lumi_match *match, const struct lumi_match_frame *f
 
 double match_half(const struct lumi_match *match)
 {
+    if (match->period > 0) /* a little more than half: frames do not come quite evenly */
+        return 0.75 * match->period;
     return (match->options.window > 0 ? match->options.window : match->options.spacing) / 2;
 }
 
@@ -198,6 +219,16 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
     return last >= 0 ? last : overdue(match, frame, now, match->options.patience) ? NONE : WAIT;
 }
 
+/* Of a camera that nobody triggers. */
+static int free_running(const struct lumi_match *match, const struct lumi_match_frame *frame, int64_t now)
+{
+    const bool device = match->options.device_clock && frame->device_ns != LUMI_MATCH_NO_TIME;
+    const int near =
+        match_nearest(match, device ? frame->device_ns : frame->host_ns - (int64_t)(match->period * 1e9), true);
+
+    return near >= 0 ? near : overdue(match, frame, now, match->options.settle) ? NONE : WAIT;
+}
+
 static bool known_beyond(const struct lumi_match *match, int64_t at)
 {
     return match->exposure_count > 0 &&
@@ -210,6 +241,8 @@ static int decide(struct lumi_match *match, int place, int64_t now)
 
     if (match->overflow && place == 0)
         return NONE;
+    if (match->period > 0)
+        return free_running(match, frame, now);
     if (!match->options.device_clock || frame->device_ns == LUMI_MATCH_NO_TIME || !match->clock_known)
         return by_arrival(match, place, now);
     int64_t at = match_to_host(match, frame->device_ns);
@@ -239,7 +272,10 @@ static void hit(struct lumi_match *match, int i, const struct lumi_match_frame *
                                          .latency = (double)(frame->host_ns - e->at) * 1e-9};
     result->out_of_order = match->last > i;
     result->late = match->latency > 0 && result->latency > 2 * match->latency + LATE_LEAST;
-    result->residual = match_clock_add(match, frame, e->at);
+    if (match->period > 0)
+        result->late = result->out_of_order = false;
+    else
+        result->residual = match_clock_add(match, frame, e->at);
     match_latency_add(match, result->latency);
     e->matched = true;
     e->sequence = frame->sequence;
@@ -280,7 +316,7 @@ static bool next_frame(struct lumi_match *match, int64_t now, struct lumi_match_
                 result->shot = near >= 0 ? match->exposures[near].shot : -1;
                 match->counts.doubled++;
             } else {
-                match->counts.surplus++;
+                match->counts.surplus += match->period <= 0;
             }
         }
         take_out(match, place);

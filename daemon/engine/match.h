@@ -29,6 +29,10 @@ struct lumi_match_options {
     double patience; /* s after an exposure until its frame counts as dropped */
     double settle;   /* s, that an exposure may be known later than its frame arrives (0.5) */
     double early;    /* s, by which a frame without clock may seem to arrive before it was taken (0.002) */
+    /* s; above 0: frames come by themselves, about one in this time (it is measured from there on), and an exposure
+     * gets one that began about when it did. The others are of none, which is no news: they are not counted.
+     * device_clock then says that the camera's clock is the host's. */
+    double period;
     bool device_clock;
     bool edges; /* every exposure should be seen by an edge (lumi_match_edge) */
 };

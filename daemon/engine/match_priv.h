@@ -43,7 +43,9 @@ struct lumi_match {
     double drift;
     struct match_pair pairs[MATCH_PAIRS];
     int pair_count, pair_next;
-    double latency; /* s, usual; 0 unknown */
+    double latency;                 /* s, usual; 0 unknown */
+    double period;                  /* s, of frames that come by themselves, as measured; 0: they do not */
+    struct lumi_match_frame before; /* the last that came: what the period is measured from */
     struct lumi_match_clock counts;
     double residual_sum; /* of squares */
     uint64_t residual_count;

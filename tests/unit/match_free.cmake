@@ -1,0 +1,1 @@
+lumi_test(test_match_free FOLDERS engine)
