@@ -4,10 +4,12 @@
  *
  * An event's id is "EPOCH-NUMBER". The epoch is another for every start of the program: who comes back with one of an
  * earlier start gets all that is kept. "progress" (a Capture) has no id: only the newest is worth having. */
+#define _GNU_SOURCE /* POLLRDHUP */
 #include "daemon/http/api_priv.h"
 #include "daemon/http/api_report.h"
 
 #include <inttypes.h>
+#include <poll.h>
 #include <string.h>
 
 #define RING 2048
@@ -189,6 +191,26 @@ static void see_progress(struct lumi_api_events *events)
     }
 }
 
+/* The server does not read from who listens, so nobody tells it that the other side has closed. */
+static bool has_hung_up(GSocket *socket)
+{
+    struct pollfd fd = {.fd = g_socket_get_fd(socket), .events = POLLRDHUP};
+
+    return poll(&fd, 1, 0) > 0;
+}
+
+/* Hangs up on who has hung up, and on who takes nothing: the next write fails, and the message is finished. */
+static void look_after(struct listener *listener, int64_t now)
+{
+    GSocket *socket = soup_server_message_get_socket(listener->message);
+
+    if (!socket || (!has_hung_up(socket) && !(listener->busy && now - listener->written_ns > PATIENCE_NS)))
+        return;
+    g_socket_shutdown(socket, TRUE, TRUE, NULL);
+    if (!listener->busy)
+        send_block(listener, g_string_new(": gone\n\n"));
+}
+
 static gboolean on_tick(void *context)
 {
     struct lumi_api_events *events = context;
@@ -200,12 +222,8 @@ static gboolean on_tick(void *context)
     }
     take_told(events);
     see_progress(events);
-    for (guint i = 0; i < events->listeners->len; i++) {
-        struct listener *listener = events->listeners->pdata[i];
-        GSocket *socket = soup_server_message_get_socket(listener->message);
-        if (listener->busy && now - listener->written_ns > PATIENCE_NS && socket)
-            g_socket_shutdown(socket, TRUE, TRUE, NULL); /* the write fails, and the message is finished */
-    }
+    for (guint i = 0; i < events->listeners->len; i++)
+        look_after(events->listeners->pdata[i], now);
     pump_all(events);
     return G_SOURCE_CONTINUE;
 }
