@@ -24,8 +24,11 @@ static bool shown;
 
 void cli_progress(const char *what, long done, long total)
 {
-    if (!isatty(STDERR_FILENO))
+    if (!isatty(STDERR_FILENO)) {
+        if (total > 0 && getenv("LUMI_PROGRESS")) /* somebody reads along: lumid, docs/handover.md */
+            fprintf(stderr, "progress: %ld/%ld %s\n", done, total, what);
         return;
+    }
     if (total > 0)
         fprintf(stderr, "\r\033[K%s %ld/%ld (%ld %%)", what, done, total, done * 100 / total);
     else

@@ -1,0 +1,1 @@
+lumi_test(test_handover FOLDERS handover capture base LABELS threads)
