@@ -52,6 +52,15 @@ static const struct form {
     {"power off", SIM_FAULT_POWER, 1},
     {"power on", SIM_FAULT_POWER, 0},
     {"power cut-in-flash @", SIM_FAULT_CUT_IN_FLASH, 0},
+    {"camera %camera unplugged", SIM_FAULT_CAMERA_UNPLUG, 1},
+    {"camera %camera plugged", SIM_FAULT_CAMERA_UNPLUG, 0},
+    {"camera %camera exposure @", SIM_FAULT_EXPOSURE, 0},
+    {"camera %camera frames dropped", SIM_FAULT_FRAMES_DROPPED, 1},
+    {"camera %camera frames sent", SIM_FAULT_FRAMES_DROPPED, 0},
+    {"camera %camera frames doubled", SIM_FAULT_FRAMES_DOUBLED, 1},
+    {"camera %camera frames single", SIM_FAULT_FRAMES_DOUBLED, 0},
+    {"camera %camera frames late @s", SIM_FAULT_FRAMES_LATE, 0},
+    {"camera %camera packets lost @", SIM_FAULT_PACKETS_LOST, 0},
 };
 
 static const char *const input_names[BOARD_INPUTS] = {"estop", "index",        "slack",  "string-end",
@@ -98,6 +107,7 @@ static double most_of(enum sim_fault_kind kind)
 {
     switch (kind) {
     case SIM_FAULT_LINK_NOISE:
+    case SIM_FAULT_PACKETS_LOST:
         return 1;
     case SIM_FAULT_BOUNCE:
         return 1;

@@ -30,6 +30,12 @@ enum sim_fault_kind {
     SIM_FAULT_RESET,        /* index: enum board_reset */
     SIM_FAULT_POWER,        /* value: 1 off, 0 on */
     SIM_FAULT_CUT_IN_FLASH, /* value: bytes until the power goes */
+    SIM_FAULT_CAMERA_UNPLUG,
+    SIM_FAULT_EXPOSURE, /* value: times what it was told; so for all of these index: camera */
+    SIM_FAULT_FRAMES_DROPPED,
+    SIM_FAULT_FRAMES_DOUBLED,
+    SIM_FAULT_FRAMES_LATE,  /* value: s */
+    SIM_FAULT_PACKETS_LOST, /* value: share */
     SIM_FAULT_KINDS
 };
 

@@ -79,6 +79,24 @@ static void camera(struct sim_fault_run *run, struct sim_machine *machine, const
     case SIM_FAULT_CAMERA_LAG:
         state->lag = fault->value;
         break;
+    case SIM_FAULT_CAMERA_UNPLUG:
+        state->unplugged = fault->value != 0;
+        break;
+    case SIM_FAULT_EXPOSURE:
+        state->exposure = fault->value;
+        break;
+    case SIM_FAULT_FRAMES_DROPPED:
+        state->frames_dropped = fault->value != 0;
+        break;
+    case SIM_FAULT_FRAMES_DOUBLED:
+        state->frames_doubled = fault->value != 0;
+        break;
+    case SIM_FAULT_FRAMES_LATE:
+        state->frames_late = fault->value;
+        break;
+    case SIM_FAULT_PACKETS_LOST:
+        state->packets_lost = fault->value;
+        break;
     default:
         state->busy = fault->value;
     }
@@ -159,6 +177,12 @@ static void act(struct sim_fault_run *run, struct sim_machine *machine, const st
     case SIM_FAULT_CAMERA_MUTE:
     case SIM_FAULT_CAMERA_LAG:
     case SIM_FAULT_CAMERA_BUSY:
+    case SIM_FAULT_CAMERA_UNPLUG:
+    case SIM_FAULT_EXPOSURE:
+    case SIM_FAULT_FRAMES_DROPPED:
+    case SIM_FAULT_FRAMES_DOUBLED:
+    case SIM_FAULT_FRAMES_LATE:
+    case SIM_FAULT_PACKETS_LOST:
         camera(run, machine, fault);
         break;
     case SIM_FAULT_HANG:

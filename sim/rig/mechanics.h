@@ -123,7 +123,16 @@ struct sim_camera_fault {
     double lag;        /* s, more than it should */
     double busy;       /* s, more than it should */
     bool feedback_off; /* exposes, but does not say so */
+    double exposure;   /* times what it was told; 0: that */
+    /* What becomes of its frames: for who makes them (sim/gige). */
+    bool unplugged; /* takes no trigger either */
+    bool frames_dropped, frames_doubled;
+    double frames_late;  /* s */
+    double packets_lost; /* share */
 };
+const struct sim_camera_fault *sim_mechanics_camera_faults(const struct sim_mechanics *mechanics, int camera);
+/* How long this camera exposes from now on; 0: as the others. */
+void sim_mechanics_set_camera_exposure(struct sim_mechanics *mechanics, int camera, double seconds);
 void sim_mechanics_camera_fault(struct sim_mechanics *mechanics, int camera, const struct sim_camera_fault *fault);
 
 #endif

@@ -50,6 +50,7 @@ struct sim_camera {
     uint64_t frames; /* of the recording, so far */
     uint64_t started;
     uint64_t focused_since;
+    double exposure; /* s, of its own; 0: as all */
     struct sim_camera_fault fault;
 };
 

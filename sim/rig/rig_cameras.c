@@ -42,10 +42,12 @@ static void trigger(struct sim_mechanics *m, int index)
     struct sim_camera *camera = &m->cameras[index];
     struct sim_exposure record = {.camera = index, .trigger = m->now, .field = m->platform.field};
     int n = m->exposure_count ? (int)(camera->taken % (uint32_t)m->exposure_count) : 0;
-    double seconds = m->exposure_count ? m->exposures[n] : 0.004;
+    double seconds = camera->exposure > 0 ? camera->exposure : m->exposure_count ? m->exposures[n] : 0.004;
 
     record.exposure = n;
-    record.lost = camera->stage != 0 || m->now < camera->busy_until || camera->fault.dead;
+    record.lost = camera->stage != 0 || m->now < camera->busy_until || camera->fault.dead || camera->fault.unplugged;
+    if (camera->fault.exposure > 0)
+        seconds *= camera->fault.exposure;
     if (!record.lost) {
         camera->begin = record.begin = m->now + TICKS(lag_of(m, index));
         camera->end = record.end = record.begin + TICKS(seconds);
@@ -178,6 +180,17 @@ void sim_mechanics_set_exposures(struct sim_mechanics *m, const double *seconds,
         m->exposures[i] = seconds[i];
     for (int i = 0; i < m->truth.camera_count; i++)
         m->cameras[i].taken = 0;
+}
+
+void sim_mechanics_set_camera_exposure(struct sim_mechanics *m, int camera, double seconds)
+{
+    if (camera >= 0 && camera < LUMI_RIG_CAMERAS)
+        m->cameras[camera].exposure = seconds;
+}
+
+const struct sim_camera_fault *sim_mechanics_camera_faults(const struct sim_mechanics *m, int camera)
+{
+    return &m->cameras[camera].fault;
 }
 
 void sim_mechanics_camera_fault(struct sim_mechanics *m, int camera, const struct sim_camera_fault *fault)

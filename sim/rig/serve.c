@@ -33,6 +33,7 @@ void sim_serve_options_init(struct sim_serve_options *options, const struct lumi
     options->machine.link_rate = 11520;
     options->machine.link_delay = 1e-4;
     options->speed = 1;
+    options->turn_fd = -1;
 }
 
 static double clock_now(void)
@@ -114,7 +115,7 @@ static void follow(struct server *server, const struct sim_serve_options *option
     uint8_t bytes[1024];
 
     while (!(options->stop && *options->stop)) {
-        struct pollfd wait = {.fd = server->master, .events = POLLIN};
+        struct pollfd wait[2] = {{.fd = server->master, .events = POLLIN}, {.fd = options->turn_fd, .events = POLLIN}};
         ssize_t got = read(server->master, bytes, sizeof bytes);
         double now = clock_now();
         sim_machine_run(server->machine, fmin(now - before, BEHIND) * options->speed);
@@ -122,9 +123,11 @@ static void follow(struct server *server, const struct sim_serve_options *option
         if (got > 0)
             sim_machine_put(server->machine, bytes, (size_t)got);
         send_bytes(server);
+        if (options->turn)
+            options->turn(options->context, server->machine);
         if (options->seconds > 0 && sim_machine_seconds(server->machine) - began >= options->seconds)
             return;
-        poll(&wait, 1, got > 0 ? ANSWER_MS : IDLE_MS);
+        poll(wait, 2, got > 0 ? ANSWER_MS : IDLE_MS);
     }
 }
 

@@ -19,6 +19,10 @@ struct sim_serve_options {
     const volatile sig_atomic_t *stop;     /* ends it when it is not 0; NULL: nothing does */
     /* Told the pseudo-terminal's path once it is there. */
     void (*ready)(void *context, const char *path);
+    /* After every step of virtual time, a few milliseconds; NULL: nobody is told. What it waits for besides the host is
+     * `turn_fd`, −1: nothing. */
+    void (*turn)(void *context, struct sim_machine *machine);
+    int turn_fd;
     void *context;
 };
 void sim_serve_options_init(struct sim_serve_options *options, const struct lumi_rig *rig);

@@ -1,0 +1,35 @@
+/* The parts of a simulated rig, each the whole of a process. They return when their parent or the board has gone. */
+#ifndef LUMI_SIM_GIGE_RIG_PRIV_H
+#define LUMI_SIM_GIGE_RIG_PRIV_H
+
+#include "sim/gige/rig_message.h"
+#include "sim/gige/rig_processes.h"
+
+#define RIG_EYES_MAX LUMI_RIG_CAMERAS
+
+/* What a process tells its parent: that it is ready, or why not. */
+struct rig_report {
+    int code;
+    char text[1024];
+};
+void rig_report(int fd, int code, const struct lumi_error *error);
+
+/* `eyes`: a socket to each process of cameras; camera c belongs to number owner[c]. */
+struct rig_board {
+    const struct sim_rig_processes *rig;
+    int report, life; /* pipes from and to the parent: `life` ends when it goes */
+    int eyes[RIG_EYES_MAX], eye_count;
+    int owner[LUMI_RIG_CAMERAS];
+};
+int rig_board_run(const struct rig_board *board, struct lumi_error *error);
+
+struct rig_eyes {
+    const struct sim_rig_processes *rig;
+    int report, board;
+    int first, count; /* its cameras */
+};
+int rig_eyes_run(const struct rig_eyes *eyes, struct lumi_error *error);
+
+int rig_files_write(const struct sim_rig_processes *rig, struct lumi_error *error);
+
+#endif

@@ -1,0 +1,45 @@
+/* A whole simulated rig as separate processes: the firmware behind a pseudo-terminal, GigE Vision cameras on loopback
+ * addresses that photograph a simulated place from where they truly are, and what goes wrong with them. */
+#ifndef LUMI_SIM_GIGE_RIG_PROCESSES_H
+#define LUMI_SIM_GIGE_RIG_PROCESSES_H
+
+#include "proto/mechanism/rig.h"
+#include "proto/mechanism/sweep_plan.h"
+#include "sim/gige/gige.h"
+#include "sim/rig/faults.h"
+
+#include <signal.h>
+
+struct sim_rig_processes {
+    const char *place; /* of sim/place.h */
+    struct lumi_rig rig;
+    char folder[512]; /* absolute, is there: board, rig.txt, plan.txt, lumid.conf and captures are made in it */
+    uint64_t seed;
+    double speed;   /* virtual seconds a second */
+    int processes;  /* that draw; 0: as many as there are processors */
+    int first_host; /* addresses: 127.0.0.first_host and on */
+    struct sim_sensor sensor;
+    double reference;                      /* s of exposure that make a picture as bright as the place is */
+    const struct sim_fault_script *faults; /* or NULL */
+    /* Into the files. */
+    double position_time, exposure; /* of the plan: start-stop */
+    char layout[16];                /* of lumid's frames: "raw", "jpeg", "rgb" */
+    int bits;
+    int port;            /* of lumid's API */
+    const char *process; /* command after a capture, or NULL */
+    const volatile sig_atomic_t *stop;
+    void (*ready)(const struct sim_rig_processes *rig); /* when all run; or NULL */
+    /* Started then, in the same network, with LUMI_SIM_RIG=folder; all ends when it does. Ends with NULL; or NULL. */
+    char *const *command;
+};
+void sim_rig_processes_init(struct sim_rig_processes *rig);
+
+/* Until *stop, or `command` ends (LUMI_ERR_IO where it failed), or one of the rig's own does (LUMI_ERR_IO, its name).
+ */
+int sim_rig_processes_run(const struct sim_rig_processes *rig, struct lumi_error *error);
+
+/* "127.0.0.2", and the serial number, of a camera. */
+void sim_rig_processes_address(const struct sim_rig_processes *rig, int camera, char address[16]);
+void sim_rig_processes_serial(const struct sim_rig_processes *rig, int camera, char serial[16]);
+
+#endif
