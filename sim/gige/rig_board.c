@@ -1,5 +1,5 @@
 /* The process with the board: virtual time, mechanics, and what the cameras are told of them. */
-#include "sim/gige/rig_priv.h"
+#include "sim/gige/rig_parts.h"
 #include "sim/rig/serve.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
 /* A process with cameras: what they see is drawn for where they truly are, as their shutters move through it. */
-#include "sim/gige/rig_priv.h"
+#include "sim/gige/rig_parts.h"
 
 #include "proto/base/memory.h"
 #include "proto/mechanism/kinematics.h"

@@ -1,7 +1,7 @@
 /* Starts the processes of a simulated rig, and ends them together. */
 #include "sim/gige/rig_processes.h"
 
-#include "sim/gige/rig_priv.h"
+#include "sim/gige/rig_parts.h"
 
 #include <errno.h>
 #include <fcntl.h>

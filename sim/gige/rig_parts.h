@@ -1,6 +1,6 @@
 /* The parts of a simulated rig, each the whole of a process. They return when their parent or the board has gone. */
-#ifndef LUMI_SIM_GIGE_RIG_PRIV_H
-#define LUMI_SIM_GIGE_RIG_PRIV_H
+#ifndef LUMI_SIM_GIGE_RIG_PARTS_H
+#define LUMI_SIM_GIGE_RIG_PARTS_H
 
 #include "sim/gige/rig_message.h"
 #include "sim/gige/rig_processes.h"

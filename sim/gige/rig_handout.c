@@ -1,5 +1,5 @@
 /* What a program that drives the rig is told of it: profile, plan, lumid's configuration. */
-#include "sim/gige/rig_priv.h"
+#include "sim/gige/rig_parts.h"
 
 #include "proto/base/file.h"
 
