@@ -16,7 +16,7 @@ lumi_house(text ${here}/text.sh ${PROJECT_SOURCE_DIR} ${here}/bounds.txt)
 lumi_house(format ${here}/format.sh ${PROJECT_SOURCE_DIR})
 
 # Every header alone, with the include folders of the libraries that the program uses, and which Embree it is.
-set(flags "$<TARGET_PROPERTY:lumi,INCLUDE_DIRECTORIES>")
+set(flags "$<TARGET_PROPERTY:lumi,INCLUDE_DIRECTORIES>;$<TARGET_PROPERTY:lumi_camera,INCLUDE_DIRECTORIES>")
 set(defined "$<TARGET_PROPERTY:lumi_sim,COMPILE_DEFINITIONS>")
 find_program(LUMI_CXX NAMES c++ g++ clang++)
 if(LUMI_CXX)
