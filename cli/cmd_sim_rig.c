@@ -22,7 +22,8 @@ static volatile sig_atomic_t stop;
 static const GOptionEntry options[] = {
     {"folder", 'o', 0, G_OPTION_ARG_FILENAME, &folder,
      "where board, rig.txt, plan.txt, lumid.conf and captures are made (rig)", "DIR"},
-    {"rig", 0, 0, G_OPTION_ARG_STRING, &rig_text, "arc16 (default), arc16x2 or bar2", "RIG"},
+    {"rig", 0, 0, G_OPTION_ARG_STRING, &rig_text,
+     "arc16 (default), arc16x2, bar2 or arc:CAMERASxPOSITIONS:RADIUS (metres)", "RIG"},
     {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale, "shrinks its counts and resolution alike (1)", "S"},
     {"size", 0, 0, G_OPTION_ARG_STRING, &size_text, "size of the pictures, whatever the scale", "WxH"},
     {"profile", 0, 0, G_OPTION_ARG_FILENAME, &profile, "a rig of one's own instead: its profile", "FILE"},
@@ -80,7 +81,7 @@ static int read_rig(struct lumi_rig *rig, struct lumi_error *error)
     wanted.height = size[1];
     code = sim_rig_init(&made, rig_text, &wanted, error);
     if (code == LUMI_OK && !made.mechanism)
-        code = lumi_fail(error, LUMI_ERR_ARG, "--rig %s: arc16, arc16x2 or bar2 wanted", rig_text);
+        code = lumi_fail(error, LUMI_ERR_ARG, "--rig %s: a mechanism is wanted: arc16, arc16x2, bar2, arc:…", rig_text);
     *rig = made.profile;
     sim_rig_finish(&made);
     return code;

@@ -11,7 +11,9 @@ static gboolean inward;
 static const GOptionEntry options[] = {
     {"output", 'o', 0, G_OPTION_ARG_FILENAME, &out, "the capture to make", "CAPTURE"},
     {"rig", 0, 0, G_OPTION_ARG_STRING, &rig_text,
-     "arc16 (default), arc16x2, bar2, planar:ROWSxCOLS:SPACING or sphere:ROWSxCOLS:RADIUS (metres)", "RIG"},
+     "arc16 (default), arc16x2, bar2, arc:CAMERASxPOSITIONS:RADIUS, planar:ROWSxCOLS:SPACING or "
+     "sphere:ROWSxCOLS:RADIUS (metres)",
+     "RIG"},
     {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale,
      "shrinks counts and resolution alike, so that parallax between neighbours stays (1)", "S"},
     {"size", 0, 0, G_OPTION_ARG_STRING, &size_text, "size of the pictures, whatever the scale", "WxH"},

@@ -141,12 +141,28 @@ static int scale_profile(struct lumi_rig *rig, const struct sim_rig_options *o, 
                         error);
 }
 
+/* A rig by its name, or an arc held by its brake in other numbers. */
+static int find_profile(const char *name, struct lumi_rig *profile, struct lumi_error *error)
+{
+    int cameras, positions, end = 0;
+    double radius;
+
+    if (strncmp(name, "arc:", 4) != 0)
+        return lumi_rig_builtin(name, profile, error);
+    if (sscanf(name + 4, "%dx%d:%lf%n", &cameras, &positions, &radius, &end) != 3 || name[4 + end])
+        return lumi_fail(error, LUMI_ERR_ARG, "rig %s: arc:CAMERASxPOSITIONS:RADIUS wanted", name);
+    if (cameras < 1 || cameras > LUMI_RIG_CAMERAS || positions < 1 || positions > LUMI_RIG_POSITIONS_MAX ||
+        !(radius > 0 && radius < 1000))
+        return lumi_fail(error, LUMI_ERR_ARG, "rig %s: cameras, positions or metres out of range", name);
+    return lumi_rig_arc(profile, cameras, positions, 1, radius, 1280, 1024, 110 * DEGREE, 88 * DEGREE, error);
+}
+
 static int init_mechanism(struct sim_rig *rig, const char *name, const struct sim_rig_options *o,
                           struct lumi_error *error)
 {
     struct lumi_rig *p = &rig->profile;
 
-    LUMI_TRY(lumi_rig_builtin(name, p, error));
+    LUMI_TRY(find_profile(name, p, error));
     LUMI_TRY(scale_profile(p, o, error));
     rig->mechanism = true;
     rig->cameras = p->camera_count;

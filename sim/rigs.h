@@ -45,8 +45,8 @@ struct sim_rig {
     struct lumi_rig profile;
 };
 
-/* "arc16", "arc16x2", "bar2", "planar:ROWSxCOLS:SPACING", "sphere:ROWSxCOLS:RADIUS"; metres. Release with
- * sim_rig_finish. LUMI_ERR_ARG says what is wrong. */
+/* "arc16", "arc16x2", "bar2", "arc:CAMERASxPOSITIONS:RADIUS" (held by its brake), "planar:ROWSxCOLS:SPACING",
+ * "sphere:ROWSxCOLS:RADIUS"; metres. Release with sim_rig_finish. LUMI_ERR_ARG says what is wrong. */
 int sim_rig_init(struct sim_rig *rig, const char *text, const struct sim_rig_options *options,
                  struct lumi_error *error);
 void sim_rig_finish(struct sim_rig *rig);

@@ -65,7 +65,7 @@ static int write_configuration(const struct sim_rig_processes *rig, struct lumi_
     /* Drawing is slower than a camera, and several share a processor: a frame may be late. */
     g_string_append_printf(text,
                            "\n[rig]\nlink = serial:%s/board\n\n[capture]\nfolder = %s\nframe_patience_s = 60\n"
-                           "memory = 256M\n\n[http]\nlisten = localhost:%d\n",
+                           "memory = 256M\n\n[judge]\nclipped = 0.9\n\n[http]\nlisten = localhost:%d\n",
                            rig->folder, captures, rig->port);
     if (rig->process)
         g_string_append_printf(text, "\n[process]\ncommand = %s\n", rig->process);
