@@ -1,5 +1,6 @@
 /* lumid: the rig's daemon. */
 #include "daemon/lumid/config.h"
+#include "daemon/lumid/service.h"
 #include "proto/base/memory.h"
 
 #include <glib.h>
@@ -38,12 +39,32 @@ static int print(char *text)
     return text ? 0 : 1;
 }
 
+static int run(const char *path, const char *ingest)
+{
+    struct lumi_config *config = g_new(struct lumi_config, 1);
+    struct lumi_service_options options = {.config = config, .ingest = ingest};
+    struct lumi_error error = {0};
+    int code = lumi_config_load(path, config, problem, NULL, &error);
+
+    if (code != LUMI_OK && code != LUMI_ERR_FORMAT)
+        fprintf(stderr, "lumid: %s\n", error.text);
+    if (code == LUMI_OK) {
+        code = lumi_service_run(&options, &error);
+        if (code != LUMI_OK)
+            lumi_service_log(3, "%s", error.text);
+    }
+    g_free(config);
+    /* Nothing on the command line is to blame for what the configuration says. */
+    return code == LUMI_ERR_ARG ? 3 : lumi_exit_status(code);
+}
+
 int main(int argc, char **argv)
 {
-    char *path = NULL;
+    char *path = NULL, *ingest = NULL;
     gboolean checking = FALSE, printing = FALSE, manual = FALSE, version = FALSE;
     const GOptionEntry options[] = {
         {"config", 'c', 0, G_OPTION_ARG_FILENAME, &path, "the configuration (" DEFAULT_CONFIG ")", "FILE"},
+        {"ingest", 0, 0, G_OPTION_ARG_FILENAME, &ingest, "take in what arrives in FOLDER, without a rig", "FOLDER"},
         {"check", 0, 0, G_OPTION_ARG_NONE, &checking, "check the configuration and what it names, and end", NULL},
         {"print-config", 0, 0, G_OPTION_ARG_NONE, &printing, "print a configuration with every key, commented", NULL},
         {"print-manual", 0, 0, G_OPTION_ARG_NONE, &manual, "print the manual page lumid.conf(5)", NULL},
@@ -65,7 +86,12 @@ int main(int argc, char **argv)
         status = print(printing ? lumi_config_print() : lumi_config_manual());
     else if (checking)
         status = check(path ? path : DEFAULT_CONFIG);
+    else if (ingest && *ingest != '/')
+        fprintf(stderr, "lumid: --ingest %s: is no path from the root\n", ingest);
+    else
+        status = run(path ? path : DEFAULT_CONFIG, ingest);
     g_option_context_free(context);
     g_free(path);
+    g_free(ingest);
     return status;
 }

@@ -1,0 +1,64 @@
+/* What the files of the service share. */
+#ifndef LUMI_DAEMON_LUMID_SERVICE_PRIV_H
+#define LUMI_DAEMON_LUMID_SERVICE_PRIV_H
+
+#include "daemon/handover/handover.h"
+#include "daemon/http/api_server.h"
+#include "daemon/lumid/service.h"
+#include "daemon/lumid/tasks.h"
+#include "daemon/rig/drive.h"
+
+#include <glib.h>
+#include <stdatomic.h>
+
+struct lumi_service {
+    const struct lumi_config *config;
+    struct lumi_inbox *inbox;
+    GMainLoop *loop;
+    GSource *pump;
+    struct lumi_engine *engine;
+    struct lumi_engine_status *status; /* for looking at now and then */
+    struct lumi_http *http;
+    struct lumi_handover *handover;
+    struct lumi_ingest *ingest;
+    char *token;
+    int lock;
+    /* The rig. */
+    struct lumi_rig_link *link;
+    struct lumi_pool *requests; /* one thread: in order */
+    struct lumi_pool *drives;   /* one thread */
+    struct lumi_drive_map drive_map;
+    bool drive_busy; /* it takes the link's notices */
+    atomic_bool drive_cancel;
+    struct lumi_camera_host *hosts[LUMI_RIG_CAMERAS];
+    struct lumi_gpio *gpio;
+    int gpio_camera[LUMI_GPIO_LINES]; /* of SYNC and POWER lines, −1 all */
+    struct lumi_pool *judges, *chores;
+    bool disk_asked;
+    int64_t measured_ns; /* when the disk's speed was; 0 never */
+    double disk_bytes_per_second;
+    int64_t utc_offset_ns;
+    /* The end. */
+    bool ending;
+    int64_t ending_until_ns;
+    int code; /* why it ended */
+};
+
+int64_t lumi_service_now(void);        /* CLOCK_MONOTONIC */
+int64_t lumi_service_utc_offset(void); /* Unix time less that */
+void *lumi_service_task(size_t size, void (*work)(struct lumi_task *), void (*done)(struct lumi_task *));
+
+/* service_ports.c: what the engine asks. */
+void lumi_service_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
+/* service_rig.c */
+void lumi_service_rig_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
+/* Asks the board to stop what moves at the next safe place; a reply is not waited for. */
+void lumi_service_rest(struct lumi_service *service);
+/* service_watch.c: what happens goes to the engine. */
+void lumi_service_drain(struct lumi_service *service);
+void lumi_service_tick(struct lumi_service *service);
+void lumi_service_measure(struct lumi_service *service, bool speed);
+/* In the edge thread. */
+void lumi_service_estop(void *context, bool pressed, int64_t at_ns);
+
+#endif
