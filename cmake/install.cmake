@@ -41,6 +41,7 @@ include(CMakePackageConfigHelpers)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/generated/lumi-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_SOURCE_DIR}/cmake/lumi-config.cmake
   ${PROJECT_BINARY_DIR}/generated/lumi-config-version.cmake DESTINATION ${cmake_dir})
+file(RELATIVE_PATH up /${CMAKE_INSTALL_LIBDIR}/pkgconfig /) # the package may be put anywhere
 configure_file(${PROJECT_SOURCE_DIR}/cmake/lumi.pc.in ${PROJECT_BINARY_DIR}/generated/lumi.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/generated/lumi.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -146,16 +146,16 @@ static void processed(void *context, const struct lumi_process_status *status)
 {
     static const char *const names[] = {"waits", "runs", "is done", "failed"};
 
-    (void)context;
+    lumi_http_processing(((struct lumi_service *)context)->http, status);
     if (status->state == LUMI_PROCESS_RUNNING && status->progress > 0)
-        return;
+        return; /* once is enough here */
     lumi_service_log(status->state == LUMI_PROCESS_FAILED ? 3 : 6, "%s: processing %s%s%s", status->capture,
                      names[status->state], status->text[0] ? ": " : "", status->text);
 }
 
 static void ingested(void *context, const struct lumi_ingest_status *status)
 {
-    (void)context;
+    lumi_http_ingest(((struct lumi_service *)context)->http, status);
     if (status->state == LUMI_INGEST_TAKEN)
         lumi_service_log(6, "%s: taken in as %s", status->source, status->capture);
     else if (status->state == LUMI_INGEST_REFUSED)
@@ -310,6 +310,7 @@ static int start_http(struct lumi_service *service, struct lumi_error *error)
     options.certificate = config->certificate[0] ? config->certificate : NULL;
     options.key = config->key[0] ? config->key : NULL;
     options.body_max = config->body_max;
+    options.folder = config->engine.folder;
     options.engine = service->engine;
     options.handover = service->handover;
     options.ingest = service->ingest;

@@ -1,0 +1,20 @@
+# `cpack` in a build folder makes lumisphere_VERSION_ARCHITECTURE.deb: programs, library, manual, service. What it depends
+# on dpkg-shlibdeps finds; what happens when it is installed and removed is in cmake/package/.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME lumisphere)
+set(CPACK_PACKAGE_VENDOR Lumisphere)
+set(CPACK_PACKAGE_CONTACT "Lumisphere <lumisphere@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGE_DESCRIPTION "A rig of cameras and its daemon, from its photographs to a light field, and any view of it")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "passwd")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "glib-networking, dfu-util, udev")
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/package/postinst
+  ${PROJECT_SOURCE_DIR}/cmake/package/prerm ${PROJECT_SOURCE_DIR}/cmake/package/postrm)
+include(CPack)
