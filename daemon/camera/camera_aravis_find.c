@@ -20,8 +20,10 @@
 #define INTERFACES_MAX 64
 #define FOUND_MAX 128
 
-/* Aravis' list of USB cameras is one for the program. */
-static pthread_mutex_t usb_lock = PTHREAD_MUTEX_INITIALIZER;
+/* Aravis' list of USB cameras is one for the program; and what Aravis 0.8 keeps of the kinds of XML documents
+ * (arvdomimplementation.c) it does not lock: where two read their cameras' descriptions at once, one has no features.
+ */
+static pthread_mutex_t open_lock = PTHREAD_MUTEX_INITIALIZER;
 
 /* Text of a bootstrap register: ends with its first 0, or with the register; what is no plain text is left out. */
 static void copy_text(char *to, size_t room, const uint8_t *from, size_t size)
@@ -153,7 +155,7 @@ static int find_gige(struct lumi_camera_identity *cameras)
 
 static int find_usb(struct lumi_camera_identity *cameras, int count)
 {
-    pthread_mutex_lock(&usb_lock);
+    pthread_mutex_lock(&open_lock);
     ArvInterface *usb = arv_uv_interface_get_instance();
     arv_interface_update_device_list(usb);
     unsigned found = arv_interface_get_n_devices(usb);
@@ -170,7 +172,7 @@ static int find_usb(struct lumi_camera_identity *cameras, int count)
         g_strlcpy(camera->model, model ? model : "", sizeof camera->model);
         g_strlcpy(camera->address, id ? id : "", sizeof camera->address);
     }
-    pthread_mutex_unlock(&usb_lock);
+    pthread_mutex_unlock(&open_lock);
     return count;
 }
 
@@ -224,10 +226,19 @@ ArvDevice *aravis_device_open(const struct lumi_camera_identity *found, GError *
 {
     ArvDevice *device;
 
+    pthread_mutex_lock(&open_lock);
     if (is_address(found->address))
-        return arv_interface_open_device(arv_gv_interface_get_instance(), found->address, error);
-    pthread_mutex_lock(&usb_lock);
-    device = arv_interface_open_device(arv_uv_interface_get_instance(), found->address, error);
-    pthread_mutex_unlock(&usb_lock);
+        device = arv_interface_open_device(arv_gv_interface_get_instance(), found->address, error);
+    else
+        device = arv_interface_open_device(arv_uv_interface_get_instance(), found->address, error);
+    pthread_mutex_unlock(&open_lock);
     return device;
+}
+
+ArvChunkParser *aravis_chunk_parser(ArvCamera *camera)
+{
+    pthread_mutex_lock(&open_lock);
+    ArvChunkParser *parser = arv_camera_create_chunk_parser(camera);
+    pthread_mutex_unlock(&open_lock);
+    return parser;
 }

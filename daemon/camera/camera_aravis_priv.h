@@ -38,6 +38,7 @@ bool aravis_discovery_parse(const uint8_t *packet, size_t size, struct lumi_came
 /* The one that `what` names: a serial number, an address. */
 int aravis_find(const char *what, struct lumi_camera_identity *camera, struct lumi_error *error);
 ArvDevice *aravis_device_open(const struct lumi_camera_identity *found, GError **error);
+ArvChunkParser *aravis_chunk_parser(ArvCamera *camera); /* its description is read again: one at a time */
 
 /* ---- the camera ---- */
 

@@ -365,7 +365,7 @@ static int set_chunks(struct aravis_camera *camera, bool wanted, struct lumi_err
     camera->chunk_gain = enable_chunk(camera, gains, G_N_ELEMENTS(gains));
     count_triggers(camera);
     camera->chunk_trigger = enable_chunk(camera, triggers, G_N_ELEMENTS(triggers));
-    camera->chunks = arv_camera_create_chunk_parser(camera->camera);
+    camera->chunks = aravis_chunk_parser(camera->camera);
     return LUMI_OK;
 }
 

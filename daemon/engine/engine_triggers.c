@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define TEST_SECONDS 3.0   /* until a frame of a test shot is not seen */
+#define TEST_SECONDS 3.0   /* until a frame of a test shot is not seen, at least */
 #define OTHERS_SECONDS 0.3 /* that others may answer too */
 #define TEST_AHEAD 0.002   /* s, from the board's answer to the first edge (firing.h, FIRING_MARGIN_TICKS) */
 #define BUSY_TRIES 20
@@ -177,7 +177,8 @@ static bool answered(struct lumi_engine *e)
         e->test_ns = e->now;
     const struct engine_camera *c = e->cameras + e->test_camera;
     const double waited = engine_since(e, e->test_ns), exposure = e->plan.exposures[0];
-    if (waited < TEST_SECONDS + exposure && !(c->seen & 1u << e->test_camera && waited > OTHERS_SECONDS)) {
+    if (waited < fmax(TEST_SECONDS, e->config.frame_patience) + exposure &&
+        !(c->seen & 1u << e->test_camera && waited > OTHERS_SECONDS)) {
         engine_wake(e, 0.05);
         return false;
     }
