@@ -138,7 +138,10 @@ static void log_told(struct lumi_service *service, const struct lumi_engine_told
             lumi_service_log(5, "shot %d%s%s: %s", told->shot, *camera ? " of camera " : "", camera, told->text);
         break;
     case LUMI_TALE_INCIDENT:
-        lumi_service_log(4, "%s%s%s%s", *camera ? "camera " : "", camera, *camera ? ": " : "", told->text);
+        if (*camera && !strstr(told->text, camera))
+            lumi_service_log(4, "camera %s: %s", camera, told->text);
+        else
+            lumi_service_log(4, "%s", told->text);
         break;
     case LUMI_TALE_SEALED:
         lumi_service_log(6, "sealed: %s", told->text);
