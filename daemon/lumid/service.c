@@ -57,6 +57,10 @@ static bool ended(struct lumi_service *service)
     if (lumi_service_now() >= service->ending_until_ns)
         return true;
     lumi_engine_status(service->engine, status);
+    if (status->state == LUMI_ENGINE_SWEEPING && !service->resting) {
+        service->resting = true;
+        lumi_service_rest(service);
+    }
     return status->state != LUMI_ENGINE_SWEEPING && status->state != LUMI_ENGINE_PAUSING &&
            status->state != LUMI_ENGINE_HOMING && status->state != LUMI_ENGINE_SEALING && status->store.jobs == 0;
 }
@@ -114,9 +118,6 @@ static gboolean end(gpointer context)
     sd_notify(0, "STOPPING=1\nSTATUS=ending");
     service->ending = true;
     service->ending_until_ns = lumi_service_now() + END_NS;
-    lumi_engine_status(service->engine, service->status);
-    if (service->status->state == LUMI_ENGINE_SWEEPING)
-        lumi_service_rest(service);
     lumi_inbox_wake(service->inbox);
     return G_SOURCE_CONTINUE;
 }
@@ -167,8 +168,9 @@ static int start_handover(struct lumi_service *service, const char *ingest, stru
     const struct lumi_config *config = service->config;
     struct lumi_handover_options options;
     struct lumi_ingest_options arrivals;
-    char journal[LUMI_CONFIG_PATH + 32];
+    char journal[LUMI_CONFIG_PATH + 32], arrived[LUMI_CONFIG_PATH + 32];
 
+    snprintf(arrived, sizeof arrived, "%s/.lumid/arrived", config->engine.folder);
     snprintf(journal, sizeof journal, "%s/.lumid/journal", config->engine.folder);
     lumi_handover_options_init(&options);
     options.command = config->command;
@@ -183,6 +185,7 @@ static int start_handover(struct lumi_service *service, const char *ingest, stru
     lumi_ingest_options_init(&arrivals);
     arrivals.folder = ingest;
     arrivals.into = config->engine.folder;
+    arrivals.journal = arrived;
     arrivals.settle = config->ingest_settle;
     arrivals.handover = service->handover;
     arrivals.changed = ingested;

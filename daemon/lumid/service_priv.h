@@ -39,7 +39,7 @@ struct lumi_service {
     double disk_bytes_per_second;
     int64_t utc_offset_ns;
     /* The end. */
-    bool ending;
+    bool ending, resting;
     int64_t ending_until_ns;
     int code; /* why it ended */
 };
@@ -52,7 +52,8 @@ void *lumi_service_task(size_t size, void (*work)(struct lumi_task *), void (*do
 void lumi_service_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
 /* service_rig.c */
 void lumi_service_rig_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
-/* Asks the board to stop what moves at the next safe place; a reply is not waited for. */
+/* Asks the board, or the drive, to stop at the next safe place; a reply is not waited for. To the engine this is a
+ * pause from elsewhere: the capture goes on by itself next time, other than after lumi_engine_pause. */
 void lumi_service_rest(struct lumi_service *service);
 /* service_watch.c: what happens goes to the engine. */
 void lumi_service_drain(struct lumi_service *service);

@@ -60,8 +60,10 @@ static void request(void *context, uint32_t number, const lumi_wire_Request *req
 
 void lumi_service_rest(struct lumi_service *service)
 {
+    atomic_store(&service->drive_cancel, true);
+    if (service->drive_busy)
+        return;
     struct request_task *asked = lumi_service_task(sizeof *asked, request_work, request_done);
-
     asked->service = service;
     asked->unheard = true;
     asked->request.which_command = lumi_wire_Request_pause_tag;
