@@ -1,4 +1,4 @@
-/* golden_capture FOLDER: a capture with everything that version 1 holds, every number exact on any machine. */
+/* golden_capture FOLDER: a capture with everything that version 2 holds, every number exact on any machine. */
 #include "proto/capture/capture.h"
 
 #include <stdio.h>
@@ -100,6 +100,31 @@ static int add_frame(struct lumi_capture *capture, int i, int64_t camera, int64_
     return i < 5 ? LUMI_OK : lumi_capture_retake_frame(capture, id, &again, error);
 }
 
+/* What version 2 added; the frames are those of add_frame. */
+static int add_log(struct lumi_capture *capture, const int64_t camera[2], struct lumi_error *error)
+{
+    static const struct lumi_capture_device device = {"Acme", "M\303\274hle 5", "0815-4711", "1.2", "gige:0815-4711"};
+    static const struct lumi_capture_clock clock = {12, 0.25, -3.5, 0.0009765625, 0.001953125};
+    static const struct lumi_capture_judgement judgement = {1.5, 0.0625, 0.125, 0.25, -0.5, 2.75, 0.03125};
+    const struct lumi_capture_sweep begun = {0, 1795000000000000, LUMI_NO_TIME, ""},
+                                    ended = {0, LUMI_NO_TIME, 1795000030000000, "paused: the disk is slow"},
+                                    second = {1, 1795000040000000, LUMI_NO_TIME, ""};
+    const struct lumi_capture_incident late = {0, 1795000001500000, "late", camera[1], 2, "by 3 s"},
+                                       full = {0, LUMI_NO_TIME, "disk", 0, 0, "full"};
+
+    LUMI_TRY(lumi_capture_set_device(capture, camera[0], &device, error));
+    LUMI_TRY(lumi_capture_set_sweep(capture, &begun, error));
+    LUMI_TRY(lumi_capture_set_sweep(capture, &ended, error));
+    LUMI_TRY(lumi_capture_set_sweep(capture, &second, error));
+    LUMI_TRY(lumi_capture_set_clock(capture, 0, camera[1], &clock, error));
+    LUMI_TRY(lumi_capture_set_shot(capture, 1, 5, -1, error));
+    LUMI_TRY(lumi_capture_fire_shot(capture, 4, 0, error));
+    LUMI_TRY(lumi_capture_expose_frame(capture, 4, 4000999, error));
+    LUMI_TRY(lumi_capture_set_judgement(capture, 4, &judgement, error));
+    LUMI_TRY(lumi_capture_add_incident(capture, &late, error));
+    return lumi_capture_add_incident(capture, &full, error);
+}
+
 static int fill(struct lumi_capture *capture, struct lumi_error *error)
 {
     static const char plan[] = "{\"rows\": 2, \"name\": \"M\303\274hle\"}";
@@ -117,6 +142,7 @@ static int fill(struct lumi_capture *capture, struct lumi_error *error)
         LUMI_TRY(lumi_capture_add_shot(capture, position, 0, i % 2 ? -1.5 : 0, &shot, error));
         LUMI_TRY(add_frame(capture, i, camera[i % 2], shot, error));
     }
+    LUMI_TRY(add_log(capture, camera, error));
     LUMI_TRY(lumi_capture_commit(capture, error));
     return lumi_capture_publish(capture, "2026-11-23", error);
 }

@@ -1,5 +1,5 @@
-/* golden_dump field FILE.lumi | capture FOLDER | compare A.png B.png: what a reader gets from a file, as text that does
- * not depend on the machine; how far two pictures are apart. */
+/* golden_dump field FILE.lumi | capture FOLDER | log FOLDER | compare A.png B.png: what a reader gets from a file, as
+ * text that does not depend on the machine; how far two pictures are apart. */
 #include "proto/base/bytes.h"
 #include "proto/base/memory.h"
 #include "proto/capture/capture.h"
@@ -142,6 +142,65 @@ static int dump_frame(struct lumi_capture *capture, const struct lumi_capture_fr
     return LUMI_OK;
 }
 
+/* What version 2 added to frames. */
+static void dump_fate(const struct lumi_capture_frame *f)
+{
+    const struct lumi_capture_judgement *j = &f->judgement;
+
+    printf("frame %s: exposed %lld, shot %d of the plan, sweep %d, retake of %lld, reason '%s'\n", f->name,
+           (long long)f->exposed_time_us, f->plan_shot, f->sweep, (long long)f->retake_of, f->reason);
+    printf("  blur %.17g, clipped %.17g, dark %.17g, mean %.17g, exposure %.17g, shift %.17g, moved %.17g\n",
+           j->blur_pixels, j->clipped, j->dark, j->mean, j->exposure_stops, j->shift_pixels, j->moved);
+}
+
+static int dump_cameras(struct lumi_capture *capture, struct lumi_error *error)
+{
+    struct lumi_capture_device device;
+    struct lumi_capture_clock clock;
+    char name[LUMI_CAPTURE_NAME];
+    int64_t id;
+
+    for (int i = 0; lumi_capture_camera(capture, i, &id, name, NULL) == LUMI_OK; i++) {
+        LUMI_TRY(lumi_capture_get_device(capture, id, &device, error));
+        printf("camera %s: '%s' '%s' '%s' '%s' '%s'\n", name, device.vendor, device.model, device.serial,
+               device.firmware, device.address);
+        if (lumi_capture_get_clock(capture, 0, id, &clock, NULL) == LUMI_OK)
+            printf("  clock: %d frames, %.17g %.17g %.17g %.17g\n", clock.frames, clock.offset_s, clock.drift_ppm,
+                   clock.residual_s, clock.worst_s);
+    }
+    return LUMI_OK;
+}
+
+static int dump_log(const char *path, struct lumi_error *error)
+{
+    struct lumi_capture_incident *incidents = NULL;
+    struct lumi_capture_frame *frames = NULL;
+    struct lumi_capture_sweep *sweeps = NULL;
+    struct lumi_capture *capture;
+    int count = 0, code;
+
+    LUMI_TRY(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error));
+    LUMI_GOTO(code, done, lumi_capture_frames(capture, LUMI_FRAMES_ALL, &frames, &count, error));
+    for (int i = 0; i < count; i++)
+        dump_fate(&frames[i]);
+    LUMI_GOTO(code, done, dump_cameras(capture, error));
+    LUMI_GOTO(code, done, lumi_capture_sweeps(capture, &sweeps, &count, error));
+    for (int i = 0; i < count; i++)
+        printf("sweep %d: %lld to %lld, '%s'\n", sweeps[i].number, (long long)sweeps[i].began_us,
+               (long long)sweeps[i].ended_us, sweeps[i].outcome);
+    LUMI_GOTO(code, done, lumi_capture_incidents(capture, &incidents, &count, error));
+    for (int i = 0; i < count; i++)
+        printf("incident %lld at %lld: %s, camera %lld, frame %lld, '%s'\n", (long long)incidents[i].id,
+               (long long)incidents[i].time_us, incidents[i].kind, (long long)incidents[i].camera,
+               (long long)incidents[i].frame, incidents[i].text);
+done:
+    lumi_free(incidents);
+    lumi_free(sweeps);
+    lumi_free(frames);
+    lumi_capture_close(capture);
+    return code;
+}
+
 static int dump_capture(const char *path, struct lumi_error *error)
 {
     struct lumi_capture_frame *frames = NULL;
@@ -205,10 +264,12 @@ int main(int argc, char **argv)
         code = dump_field(argv[2], &error);
     else if (argc == 3 && !strcmp(argv[1], "capture"))
         code = dump_capture(argv[2], &error);
+    else if (argc == 3 && !strcmp(argv[1], "log"))
+        code = dump_log(argv[2], &error);
     else if (argc == 4 && !strcmp(argv[1], "compare"))
         code = compare(argv[2], argv[3], &error);
     else
-        lumi_fail(&error, code, "golden_dump field FILE.lumi | capture FOLDER | compare A.png B.png");
+        lumi_fail(&error, code, "golden_dump field FILE.lumi | capture FOLDER | log FOLDER | compare A.png B.png");
     if (code != LUMI_OK)
         fprintf(stderr, "golden_dump: %s\n", error.text);
     return lumi_exit_status(code);

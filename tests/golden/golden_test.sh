@@ -25,12 +25,18 @@ for field in "$golden"/fields/*.lumi; do
     "$dump" compare fine.png coarse.png 2>/dev/null && fail "$name: the comparison takes the coarse level for the fine one"
 done
 
-# A capture of its first version, and one that is written today: the same rows.
-cp -r "$golden/capture-1" old && mkdir -p old/data/frames
-"$dump" capture old >old.txt || fail "the capture of version 1 cannot be read"
-same "$golden/capture-1.txt" old.txt
+# Captures of every version, and one that is written today: the same rows.
+for version in 1 2; do
+    rm -rf old && cp -r "$golden/capture-$version" old && mkdir -p old/data/frames
+    "$dump" capture old >old.txt || fail "the capture of version $version cannot be read"
+    same "$golden/capture-1.txt" old.txt
+done
+"$dump" log old >log.txt || fail "the log of version 2 cannot be read"
+same "$golden/capture-2.txt" log.txt
 "$make" new || fail "no capture"
 "$dump" capture new >new.txt || fail "the new capture cannot be read"
 same "$golden/capture-1.txt" new.txt
+"$dump" log new >log.txt || fail "the new log cannot be read"
+same "$golden/capture-2.txt" log.txt
 expect 0 "7, 2 planned, 1 triggered, 1 received, 1 accepted, 1 rejected, 1 retaken" "$lumi" info old
 echo "golden_test: passed"
