@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <time.h>
 #include <unistd.h>
 
 #define JOURNAL_MAX ((size_t)64 << 20)
@@ -125,6 +126,17 @@ static int read_all(struct journal *journal, journal_fn line, void *context, str
     return code;
 }
 
+/* A program that was just started by one of us that was killed holds the lock until its exec: a moment is waited. */
+static bool lock(int fd)
+{
+    for (int i = 0; i < 50; i++) {
+        if (flock(fd, LOCK_EX | LOCK_NB) == 0)
+            return true;
+        nanosleep(&(struct timespec){0, 20000000}, NULL);
+    }
+    return false;
+}
+
 int journal_open(const char *path, journal_fn line, void *context, struct journal **journal, struct lumi_error *error)
 {
     const size_t size = strlen(path) + 1;
@@ -144,7 +156,7 @@ int journal_open(const char *path, journal_fn line, void *context, struct journa
         code = lumi_fail_errno(error, path, "open");
         goto fail;
     }
-    if (flock(made->fd, LOCK_EX | LOCK_NB) < 0) {
+    if (!lock(made->fd)) {
         code = lumi_fail(error, LUMI_ERR_BUSY, "%s: another program has it", path);
         goto fail;
     }
