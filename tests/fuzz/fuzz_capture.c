@@ -4,6 +4,29 @@
 
 #include "proto/capture/capture_priv.h"
 
+/* What version 2 added. */
+static void read_log(struct lumi_capture *capture)
+{
+    struct lumi_capture_incident *incidents;
+    struct lumi_capture_sweep *sweeps;
+    struct lumi_capture_device device;
+    struct lumi_capture_clock clock;
+    struct lumi_error error = {0};
+    char name[LUMI_CAPTURE_NAME];
+    int64_t id, frames[4];
+    int count;
+
+    if (checked(lumi_capture_incidents(capture, &incidents, &count, &error), &error) == LUMI_OK)
+        lumi_free(incidents);
+    if (checked(lumi_capture_sweeps(capture, &sweeps, &count, &error), &error) == LUMI_OK)
+        lumi_free(sweeps);
+    for (int i = 0; i < 3 && lumi_capture_camera(capture, i, &id, name, NULL) == LUMI_OK; i++) {
+        checked(lumi_capture_get_device(capture, id, &device, &error), &error);
+        checked(lumi_capture_get_clock(capture, 0, id, &clock, &error), &error);
+    }
+    checked(lumi_capture_shot_frames(capture, 1, frames, 4, &error), &error);
+}
+
 static void read_all(struct lumi_capture *capture)
 {
     struct lumi_capture_frame *frames;
@@ -21,6 +44,7 @@ static void read_all(struct lumi_capture *capture)
     if (lumi_capture_get_plan(capture, &long_text, NULL) == LUMI_OK)
         lumi_free(long_text);
     checked(lumi_capture_info(capture, &info, &error), &error);
+    read_log(capture);
     checked(lumi_capture_lens(capture, 1, &lens, &error), &error);
     checked(lumi_capture_lens(capture, 77, &lens, &error), &error);
     if (checked(lumi_capture_frames(capture, LUMI_FRAMES_ALL, &frames, &count, &error), &error) != LUMI_OK)
