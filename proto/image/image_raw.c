@@ -77,12 +77,18 @@ static void on_damage(void *user, const char *file, const int offset)
     *damaged = true;
 }
 
+/* LibRaw 0.21 tells of memory that it does not get by its results alone. */
+#if LIBRAW_MAJOR_VERSION > 0 || LIBRAW_MINOR_VERSION >= 21
+#define RAW_OPTIONS LIBRAW_OPIONS_NO_DATAERR_CALLBACK
+#else
+#define RAW_OPTIONS (LIBRAW_OPIONS_NO_MEMERR_CALLBACK | LIBRAW_OPIONS_NO_DATAERR_CALLBACK)
 static void on_no_memory(void *user, const char *file, const char *where)
 {
     (void)user;
     (void)file;
     (void)where;
 }
+#endif
 
 static int fail_raw(const struct image_source *source, int code)
 {
@@ -201,15 +207,15 @@ static int develop(const struct image_source *source, libraw_data_t *raw, const 
 static int read_raw(const struct image_source *source, struct lumi_raster *raster, struct lumi_image_meta *meta)
 {
     bool damaged = false;
-    libraw_data_t *raw = libraw_init(LIBRAW_OPIONS_NO_MEMERR_CALLBACK | LIBRAW_OPIONS_NO_DATAERR_CALLBACK);
+    libraw_data_t *raw = libraw_init(RAW_OPTIONS);
 
     if (!raw)
         return lumi_fail(source->error, LUMI_ERR_NOMEM, "%s: no memory for a raw picture", source->name);
     libraw_set_dataerror_handler(raw, on_damage, &damaged);
-    libraw_set_memerror_handler(raw, on_no_memory, NULL);
 #if LIBRAW_MAJOR_VERSION > 0 || LIBRAW_MINOR_VERSION >= 21
     raw->rawparams.max_raw_memory_mb = RAW_MEMORY_MB;
 #else
+    libraw_set_memerror_handler(raw, on_no_memory, NULL);
     raw->params.max_raw_memory_mb = RAW_MEMORY_MB;
 #endif
     int code = libraw_open_buffer(raw, (void *)(uintptr_t)source->data, source->size);

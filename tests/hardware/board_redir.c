@@ -33,7 +33,7 @@ static double wall(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-static int wait_for_peer(const char *path)
+static int listen_on(const char *path)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     if (strlen(path) >= sizeof address.sun_path)
@@ -45,39 +45,7 @@ static int wait_for_peer(const char *path)
         return -1;
     printf("board_redir: waiting on %s\n", path);
     fflush(stdout);
-    int fd = accept(server, NULL, NULL);
-    close(server);
-    if (fd >= 0)
-        fcntl(fd, F_SETFL, O_NONBLOCK);
-    return fd;
-}
-
-static void serve(struct f405_machine *machine, struct usb_redir *redir, int fd)
-{
-    double begin = wall(), back = 0;
-    uint64_t origin = f405_machine_now(machine);
-    while (!finish && usb_redir_poll(redir) && !f405_fault(f405_machine_chip(machine))) {
-        double now = wall(), at = (double)(f405_machine_now(machine) - origin) / F405_HZ;
-        if (unplug) {
-            unplug = 0;
-            usb_host_plug(f405_machine_usb(machine), false);
-            back = now + 1;
-            printf("board_redir: unplugged\n");
-            fflush(stdout);
-        }
-        if (back > 0 && now > back) {
-            back = 0;
-            usb_host_plug(f405_machine_usb(machine), true);
-        }
-        if (now - begin - at > BEHIND_MOST)
-            begin = now - at - BEHIND_MOST;
-        if (now - begin > at) {
-            f405_machine_run(machine, now - begin - at > SLICE_MS * 1e-3 ? SLICE_MS * 1e-3 : now - begin - at);
-            continue;
-        }
-        struct pollfd ready = {fd, (short)(POLLIN | (usb_redir_wants_to_write(redir) ? POLLOUT : 0)), 0};
-        poll(&ready, 1, SLICE_MS);
-    }
+    return server;
 }
 
 static void tell(struct f405_machine *machine, const struct usb_redir *redir)
@@ -90,6 +58,66 @@ static void tell(struct f405_machine *machine, const struct usb_redir *redir)
            (unsigned long long)c->bulk_in, (unsigned long long)c->bytes_in, (unsigned long long)c->bulk_out,
            (unsigned long long)c->bytes_out, (unsigned long long)c->stalls, (unsigned long long)c->cancelled,
            (unsigned long long)u->frames, (unsigned long long)u->naks, (double)f405_machine_now(machine) / F405_HZ);
+}
+
+struct cable {
+    int server, fd; /* −1: no machine is at the other end */
+    struct usb_redir *redir;
+    double back; /* when it is plugged in again; 0: it is */
+};
+
+/* A machine that has come, or has lost its power: the board has its own and goes on. */
+static void look(struct f405_machine *machine, struct cable *cable)
+{
+    if (cable->redir && !usb_redir_poll(cable->redir)) {
+        usb_host_plug(f405_machine_usb(machine), false);
+        tell(machine, cable->redir);
+        usb_redir_destroy(cable->redir);
+        close(cable->fd);
+        cable->redir = NULL;
+        cable->fd = -1;
+    }
+    if (!cable->redir && (cable->fd = accept(cable->server, NULL, NULL)) >= 0) {
+        fcntl(cable->fd, F_SETFL, O_NONBLOCK);
+        cable->redir = usb_redir_create(machine, cable->fd);
+        usb_host_plug(f405_machine_usb(machine), true);
+    }
+}
+
+static void pull(struct f405_machine *machine, struct cable *cable, double now)
+{
+    if (unplug) {
+        unplug = 0;
+        usb_host_plug(f405_machine_usb(machine), false);
+        cable->back = now + 1;
+        printf("board_redir: unplugged\n");
+        fflush(stdout);
+    }
+    if (cable->back > 0 && now > cable->back) {
+        cable->back = 0;
+        usb_host_plug(f405_machine_usb(machine), cable->redir != NULL);
+    }
+}
+
+static void serve(struct f405_machine *machine, struct cable *cable)
+{
+    double begin = wall();
+    uint64_t origin = f405_machine_now(machine);
+    while (!finish && !f405_fault(f405_machine_chip(machine))) {
+        look(machine, cable);
+        double now = wall(), at = (double)(f405_machine_now(machine) - origin) / F405_HZ;
+        pull(machine, cable, now);
+        if (now - begin - at > BEHIND_MOST)
+            begin = now - at - BEHIND_MOST;
+        if (now - begin > at) {
+            f405_machine_run(machine, now - begin - at > SLICE_MS * 1e-3 ? SLICE_MS * 1e-3 : now - begin - at);
+            continue;
+        }
+        struct pollfd ready = {cable->redir ? cable->fd : cable->server, POLLIN, 0};
+        if (cable->redir && usb_redir_wants_to_write(cable->redir))
+            ready.events |= POLLOUT;
+        poll(&ready, 1, SLICE_MS);
+    }
 }
 
 int main(int count, char **argument)
@@ -113,21 +141,19 @@ int main(int count, char **argument)
         fprintf(stderr, "board_redir: %s\n", machine ? error.text : "no machine");
         return 1;
     }
-    int fd = wait_for_peer(argument[2]);
-    struct usb_redir *redir = fd >= 0 ? usb_redir_create(machine, fd) : NULL;
-    if (!redir) {
+    struct cable cable = {.server = listen_on(argument[2]), .fd = -1};
+    if (cable.server < 0 || fcntl(cable.server, F_SETFL, O_NONBLOCK)) {
         fprintf(stderr, "board_redir: %s: %s\n", argument[2], strerror(errno));
         return 1;
     }
     f405_machine_power(machine, true);
-    usb_host_plug(f405_machine_usb(machine), true);
-    serve(machine, redir, fd);
-    tell(machine, redir);
+    serve(machine, &cable);
+    if (cable.redir)
+        tell(machine, cable.redir);
     const char *fault = f405_fault(f405_machine_chip(machine));
     if (fault)
         fprintf(stderr, "board_redir: %s\n", fault);
-    usb_redir_destroy(redir);
+    usb_redir_destroy(cable.redir);
     f405_machine_destroy(machine);
-    close(fd);
     return fault != NULL;
 }
