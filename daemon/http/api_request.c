@@ -8,6 +8,17 @@
 #include <json-glib/json-glib.h>
 #include <string.h>
 
+/* What came from outside, as it may stand in a message: one line of some length. */
+static char *quoted(const char *text)
+{
+    g_autofree char *valid = g_utf8_make_valid(text, -1);
+    GString *out = g_string_new(NULL);
+
+    for (const char *at = valid; *at && g_utf8_pointer_to_offset(valid, at) < 60; at = g_utf8_next_char(at))
+        g_string_append_unichar(out, g_unichar_isprint(g_utf8_get_char(at)) ? g_utf8_get_char(at) : '?');
+    return g_string_free(out, FALSE);
+}
+
 /* ---- addresses ---- */
 
 static bool parse_port(const char *text, int *port)
@@ -25,26 +36,26 @@ int lumi_api_listen_parse(const char *text, struct lumi_api_listen *listen, stru
 {
     const char *colon = strrchr(text, ':');
     size_t size = colon ? (size_t)(colon - text) : 0;
+    g_autofree char *shown = quoted(text);
 
     if (!colon || !size || size >= sizeof listen->host || !parse_port(colon + 1, &listen->port))
-        return lumi_fail(error, LUMI_ERR_ARG,
-                         "listen on '%.80s': localhost:PORT, ADDRESS:PORT or [ADDRESS]:PORT wanted", text);
+        return lumi_fail(error, LUMI_ERR_ARG, "listen on '%s': localhost:PORT, ADDRESS:PORT or [ADDRESS]:PORT wanted",
+                         shown);
     memcpy(listen->host, text, size);
     listen->host[size] = '\0';
     if (size > 2 && listen->host[0] == '[' && listen->host[size - 1] == ']') {
         memmove(listen->host, listen->host + 1, size - 2);
         listen->host[size - 2] = '\0';
     } else if (strchr(listen->host, ':'))
-        return lumi_fail(error, LUMI_ERR_ARG, "listen on '%.80s': an IPv6 address stands in brackets: [%s]:PORT", text,
-                         listen->host);
+        return lumi_fail(error, LUMI_ERR_ARG, "listen on '%s': an IPv6 address stands in brackets: [ADDRESS]:PORT",
+                         shown);
     listen->loopback = !strcmp(listen->host, "localhost");
     if (listen->loopback || !strcmp(listen->host, "*"))
         return LUMI_OK;
     g_autoptr(GInetAddress) address = g_inet_address_new_from_string(listen->host);
     if (!address)
         return lumi_fail(error, LUMI_ERR_ARG,
-                         "listen on '%.80s': '%s' is neither localhost nor an address of this computer in numbers",
-                         text, listen->host);
+                         "listen on '%s': neither localhost nor an address of this computer in numbers", shown);
     listen->loopback = g_inet_address_get_is_loopback(address);
     return LUMI_OK;
 }
@@ -163,8 +174,10 @@ static int take_members(JsonObject *object, const struct lumi_api_field *fields,
         int at = 0;
         while (fields[at].name && strcmp(fields[at].name, name))
             at++;
-        if (!fields[at].name)
-            return lumi_fail(error, LUMI_ERR_FORMAT, "'%.40s': there is no such field", name);
+        if (!fields[at].name) {
+            g_autofree char *shown = quoted(name);
+            return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': there is no such field", shown);
+        }
         if (!JSON_NODE_HOLDS_NULL(node)) /* as if it were not there */
             LUMI_TRY(take_value(node, &fields[at], &body->values[at], error));
     }
