@@ -26,6 +26,8 @@ static void say(JsonObject *event, const char *what, const char *text)
     const char *time = cli_json_text(event, "time");
     const char *camera = cli_json_text(event, "camera");
 
+    if (strstr(text, camera)) /* it says so itself */
+        camera = "";
     cli_progress_end();
     printf("%.8s  %-9s %s%s%s\n", strlen(time) > 19 ? time + 11 : "        ", what, camera, *camera ? ": " : "", text);
     fflush(stdout);

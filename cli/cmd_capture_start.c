@@ -5,6 +5,7 @@
 #include "proto/base/memory.h"
 #include "proto/mechanism/sweep_plan.h"
 
+#include <math.h>
 #include <stdio.h>
 
 static char *name, *title;
@@ -58,16 +59,22 @@ static int make_body(const char *path, JsonBuilder *body, struct lumi_error *err
 
 static void print_answer(JsonObject *answer, const char *text)
 {
-    char line[512];
+    char left[32];
 
     if (json) {
         puts(text);
         return;
     }
     cli_print_checks(answer, preflight);
-    cli_capture_line(answer, line, sizeof line);
-    if (!preflight)
-        printf("%s%s%s\n", line, *cli_json_text(answer, "path") ? ": " : "", cli_json_text(answer, "path"));
+    if (preflight || !*cli_json_text(answer, "path"))
+        return;
+    printf("started: %s, %ld shots, %ld frames", cli_json_text(answer, "path"), cli_json_int(answer, "shots"),
+           cli_json_int(answer, "frames"));
+    if (isfinite(cli_json_double(answer, "seconds_left"))) {
+        cli_duration(cli_json_double(answer, "seconds_left"), left, sizeof left);
+        printf(", %s", left);
+    }
+    putchar('\n');
 }
 
 static int start(struct cli_lumid *lumid, const char *path, struct lumi_error *error)

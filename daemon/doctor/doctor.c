@@ -71,8 +71,8 @@ static void check_config(struct lumi_doctor *doctor)
         return;
     }
     if (!g_spawn_sync(NULL, argv, NULL, G_SPAWN_SEARCH_PATH, NULL, NULL, &out, &said, &status, &failed)) {
-        lumi_doctor_say(doctor, LUMI_DOCTOR_RED, "configuration", "install the package lumid",
-                        "it cannot be checked: %s", failed->message);
+        lumi_doctor_say(doctor, LUMI_DOCTOR_YELLOW, "configuration", "install the package, or put lumid into PATH",
+                        "%s is there, but not lumid, which checks it: %s", config, failed->message);
         return;
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
