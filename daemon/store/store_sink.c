@@ -1,9 +1,9 @@
 /* Bytes on their way past the page cache. What is aligned in memory and in the file (a head of whole 4096 bytes, then
  * pixels in pages of their own) is not copied.
  *
- * Measured on an NVMe disk under ext4 (docs/capture-format.md): written in the ordinary way and synced, frames of 5.5
- * MB reach a third of the disk's speed and push everything else out of the page cache; with O_DIRECT from several
- * threads they reach it. io_uring gave nothing more there: a block takes longer to hash than its call costs. */
+ * Measured (docs/capture-format.md): written in the ordinary way and synced, frames of 5.5 MB reach a third of the
+ * speed that they reach with O_DIRECT from several threads, and push everything else out of the page cache. io_uring is
+ * not used: hashing a block takes much longer than its call costs, and the threads keep the disk's queue filled. */
 #define _GNU_SOURCE /* O_DIRECT, fallocate, syscall */
 #include "daemon/store/store_sink.h"
 
