@@ -12,6 +12,7 @@
 #include <libraw/libraw.h>
 
 #define RAW_MEMORY_MB 2048
+#define RAW_RATIO 64   /* pixels of the sensor a byte of the file, at most */
 #define DEMOSAIC_AHD 3 /* Hirakawa and Parks, "Adaptive homogeneity-directed demosaicing algorithm", 2005 */
 
 static unsigned get16(const uint8_t *p, bool big)
@@ -130,6 +131,10 @@ static int describe(const struct image_source *source, const libraw_data_t *raw,
     if ((uint64_t)raw->sizes.raw_width * raw->sizes.raw_height > LUMI_IMAGE_MAX_PIXELS)
         return lumi_fail(source->error, LUMI_ERR_LIMIT, "%s: a raw picture larger than this program accepts",
                          source->name);
+    if ((uint64_t)raw->sizes.raw_width * raw->sizes.raw_height / RAW_RATIO > source->file_size)
+        return lumi_fail(source->error, LUMI_ERR_FORMAT, "%s: claims %dx%d pixels, but has only %llu bytes",
+                         source->name, raw->sizes.raw_width, raw->sizes.raw_height,
+                         (unsigned long long)source->file_size);
     LUMI_TRY(image_describe(source, raw->sizes.width, raw->sizes.height, channels, LUMI_F32, &meta->info));
     meta->info.orientation = flip == 3 ? 3 : flip == 5 ? 8 : flip == 6 ? 6 : 1;
     if (!memcmp(source->data, "II*\0", 4) || !memcmp(source->data, "MM\0*", 4))
