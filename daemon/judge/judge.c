@@ -10,6 +10,7 @@
 #include <stdlib.h>
 
 #define NOISE_BLOCK 8
+#define NOT_FOUND 0.6 /* of what neighbours should see: more is no thing that moved, and no shift can be told */
 
 /* Means of step × step pixels, so that the longer side has at most JUDGE_SMALL of them. */
 static int make_small(const struct judge_plane *plane, struct lumi_judge_picture *picture)
@@ -195,6 +196,12 @@ bool lumi_judge_verdict(const struct lumi_judge_numbers *n, const struct lumi_ju
         good = false;
         say(&line, "%.1f stops %s than its neighbours", fabs(n->exposure_stops),
             n->exposure_stops > 0 ? "brighter" : "darker");
+    }
+    if (n->moved > NOT_FOUND) {
+        good = false;
+        say(&line, "%.0f %% of it is not where its neighbours see it: the camera has moved far, or is blocked",
+            100 * n->moved);
+        return good;
     }
     if (n->shift_pixels > limits->shift_pixels) {
         good = false;

@@ -18,6 +18,7 @@
 #define INVERSE_MOST 1.6      /* 1/m: nothing is nearer than that */
 #define REACH 12              /* small pixels to either side */
 #define DIFFERENCE_FLOOR 0.06 /* of a block's mean: contrast less than that says nothing */
+#define WHITE 0.9f            /* small pixels from here on are partly white: they say nothing */
 #define MATCH 0.35            /* difference, of the blocks' own contrast, up to which they are the same */
 
 struct view {
@@ -117,24 +118,35 @@ static bool take_other(const struct job *job, const struct patch *patch, double 
     return true;
 }
 
-/* Squares of the difference against the squares of what there is to see. */
-static double differ(const struct job *job, const float *a, const float *b, double *ratio)
+/* Squares of the difference against the squares of what there is to see, where neither picture is white. False: that
+ * is hardly anywhere. */
+static bool differ(const struct job *job, const float *a, const float *b, double *found, double *ratio)
 {
     double mean_a = 0, mean_b = 0, difference = 0, contrast = 0;
-    const int n = SAMPLES * SAMPLES;
+    int n = 0;
 
-    for (int i = 0; i < n; i++) {
-        mean_a += (double)a[i] / n;
-        mean_b += (double)b[i] * job->gain / n;
+    for (int i = 0; i < SAMPLES * SAMPLES; i++) {
+        if (a[i] >= WHITE || b[i] >= WHITE)
+            continue;
+        mean_a += (double)a[i];
+        mean_b += (double)b[i] * job->gain;
+        n++;
     }
-    for (int i = 0; i < n; i++) {
+    if (n < SAMPLES * SAMPLES / 4)
+        return false;
+    mean_a /= n;
+    mean_b /= n;
+    for (int i = 0; i < SAMPLES * SAMPLES; i++) {
         double p = (double)a[i], q = (double)b[i] * job->gain;
+        if (a[i] >= WHITE || b[i] >= WHITE)
+            continue;
         difference += (p - q) * (p - q);
         contrast += ((p - mean_a) * (p - mean_a) + (q - mean_b) * (q - mean_b)) / 2;
     }
     double floor = DIFFERENCE_FLOOR * fmax((mean_a + mean_b) / 2, 0.01);
     *ratio = log2(fmax(mean_a, 1e-4) / fmax(mean_b / job->gain, 1e-4));
-    return difference / (contrast + n * floor * floor);
+    *found = difference / (contrast + n * floor * floor);
+    return true;
 }
 
 /* Looks along the ray's image and `reach` to the sides of `middle`. */
@@ -158,10 +170,10 @@ static void find_block(const struct job *job, int x0, int y0, double middle, dou
         if (!locate_patch(job, x0, y0, inverse, &patch))
             continue;
         for (double side = middle - reach; side <= middle + reach + 1e-9; side += step) {
-            double ratio;
-            if (!take_other(job, &patch, side * match->nx, side * match->ny, other))
+            double difference, ratio;
+            if (!take_other(job, &patch, side * match->nx, side * match->ny, other) ||
+                !differ(job, own, other, &difference, &ratio))
                 continue;
-            double difference = differ(job, own, other, &ratio);
             match->seen = true;
             if (difference < match->difference) {
                 match->difference = difference;
@@ -215,13 +227,14 @@ static double first_gain(const struct job *job, double *scratch)
 {
     float own[SAMPLES * SAMPLES], other[SAMPLES * SAMPLES];
     struct patch patch;
+    double difference;
     int count = 0;
 
     for (int j = 0; j < job->down; j++)
         for (int i = 0; i < job->across; i++)
             if (take_own(job, i * BLOCK, j * BLOCK, own) && locate_patch(job, i * BLOCK, j * BLOCK, 0.5, &patch) &&
-                take_other(job, &patch, 0, 0, other))
-                differ(job, own, other, &scratch[count++]);
+                take_other(job, &patch, 0, 0, other) && differ(job, own, other, &difference, &scratch[count]))
+                count++;
     return count >= 6 ? exp2(median(scratch, count)) : 0;
 }
 
