@@ -3,8 +3,8 @@
 # One folder of the house is one object library, lumi_NAME, made of every .c file in it. USES names the folders it may
 # call (see tests/house, which holds the includes to the same list). Programs link the folder; it brings what it uses.
 add_library(lumi_flags INTERFACE)
-target_compile_options(lumi_flags INTERFACE -Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes
-  -Wpointer-arith -Wundef -Wvla -fno-math-errno -ffp-contract=off)
+target_compile_options(lumi_flags INTERFACE -Wall -Wextra -Wshadow $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes>
+  $<$<COMPILE_LANGUAGE:C>:-Wmissing-prototypes> -Wpointer-arith -Wundef -Wvla -fno-math-errno -ffp-contract=off)
 target_compile_definitions(lumi_flags INTERFACE _POSIX_C_SOURCE=200809L _XOPEN_SOURCE=700 _FILE_OFFSET_BITS=64
   LUMI_VERSION="${PROJECT_VERSION}")
 target_include_directories(lumi_flags INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)

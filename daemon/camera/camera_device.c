@@ -16,11 +16,7 @@ struct backend {
     const char *missing;
 };
 static const struct backend backends[LUMI_CAMERA_BACKENDS] = {
-#ifdef LUMI_CAMERA_NO_V4L2
-    [LUMI_CAMERA_V4L2] = {"v4l2", NULL, NULL, LUMI_CAMERA_NO_V4L2},
-#else
     [LUMI_CAMERA_V4L2] = {"v4l2", camera_v4l2_list, camera_v4l2_open, NULL},
-#endif
 #ifdef LUMI_CAMERA_NO_LIBCAMERA
     [LUMI_CAMERA_LIBCAMERA] = {"libcamera", NULL, NULL, LUMI_CAMERA_NO_LIBCAMERA},
 #else
@@ -31,11 +27,7 @@ static const struct backend backends[LUMI_CAMERA_BACKENDS] = {
 #else
     [LUMI_CAMERA_ARAVIS] = {"aravis", camera_aravis_list, camera_aravis_open, NULL},
 #endif
-#ifdef LUMI_CAMERA_NO_FILES
-    [LUMI_CAMERA_FILES] = {"files", NULL, NULL, LUMI_CAMERA_NO_FILES},
-#else
     [LUMI_CAMERA_FILES] = {"files", NULL, camera_files_open, NULL},
-#endif
 };
 
 const char *lumi_camera_backend_name(enum lumi_camera_backend backend)

@@ -58,7 +58,8 @@ struct lumi_camera_frame {
     bool at_end;             /* device_ns is of the frame's end instead */
     int64_t host_ns;         /* CLOCK_MONOTONIC when its last byte was here */
     uint64_t sequence;       /* the device's own count */
-    uint32_t gap;            /* frames that the sequence says were lost just before this one */
+    uint32_t gap;            /* frames that were lost just before this one: the sequence says so, or the pool or the
+                                queue was full */
     bool damaged;            /* packets are missing, the driver says error: `data` is what there is */
     double exposure_s, gain; /* as the camera reports them for this frame; 0: it does not (gain: linear, 1 = base) */
     double temperature;      /* °C; NaN: unknown */
@@ -141,7 +142,7 @@ struct lumi_camera_ops {
     int (*disarm)(struct lumi_camera *camera, struct lumi_error *error);
     /* Fires a camera that is set to LUMI_TRIGGER_SOFTWARE. */
     int (*trigger)(struct lumi_camera *camera, struct lumi_error *error);
-    /* A new exposure time and gain while armed, from the next frame on that says so (brackets). May be NULL. */
+    /* A new exposure time and gain, armed or not, from the next frame on that says so (brackets). May be NULL. */
     int (*expose)(struct lumi_camera *camera, double exposure_s, double gain, struct lumi_error *error);
     /* LUMI_ERR_IO: the camera is gone. */
     int (*status)(struct lumi_camera *camera, struct lumi_camera_status *status, struct lumi_error *error);

@@ -45,6 +45,7 @@ struct lumi_camera_host {
     struct lumi_error fault; /* of frames, since the last status */
     int64_t next_status_ns, next_open_ns;
     uint64_t frames_dropped; /* because nobody took them, since armed */
+    uint32_t not_taken;      /* of these, since the last that was kept, and gaps before them */
     /* what it is set to, or is to be when it is back: */
     bool configured, armed, exposed;
     struct lumi_camera_setting setting;
@@ -147,10 +148,10 @@ static int restore(struct lumi_camera_host *host, struct lumi_error *error)
 
     if (host->configured)
         LUMI_TRY(camera->ops->configure(camera, &host->setting, error));
+    if (host->exposed && camera->ops->expose) /* before it is armed: its first frame is to have it */
+        LUMI_TRY(camera->ops->expose(camera, host->exposure_s, host->gain, error));
     if (host->armed)
         LUMI_TRY(camera->ops->arm(camera, error));
-    if (host->exposed && camera->ops->expose)
-        LUMI_TRY(camera->ops->expose(camera, host->exposure_s, host->gain, error));
     return LUMI_OK;
 }
 
@@ -180,6 +181,7 @@ static void try_open(struct lumi_camera_host *host)
     }
     host->told_away = false;
     host->frames_dropped = 0;
+    host->not_taken = 0;
     host->next_status_ns = 0;
     came->notice.identity = host->camera->identity;
     tell(host, came);
@@ -244,6 +246,7 @@ static int execute(struct lumi_camera_host *host, const struct lumi_camera_comma
         LUMI_TRY(camera->ops->arm(camera, error));
         host->armed = true;
         host->frames_dropped = 0;
+        host->not_taken = 0;
         return LUMI_OK;
     case LUMI_CAMERA_DISARM:
         host->armed = false; /* even where it fails: it is not to come back armed */
@@ -319,6 +322,7 @@ static void keep_frame(struct lumi_camera_host *host, struct lumi_camera_frame *
     struct entry *entry = entry_new(LUMI_CAMERA_FRAME);
     bool kept = false;
 
+    frame->gap += host->not_taken;
     pthread_mutex_lock(&host->lock);
     if (entry && host->frames_waiting < host->options.frames_max) {
         entry->notice.host_ns = camera_now_ns();
@@ -328,6 +332,7 @@ static void keep_frame(struct lumi_camera_host *host, struct lumi_camera_frame *
         kept = true;
     }
     pthread_mutex_unlock(&host->lock);
+    host->not_taken = kept ? 0 : frame->gap + 1;
     if (kept) {
         if (host->options.wake)
             host->options.wake(host->options.context);

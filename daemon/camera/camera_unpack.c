@@ -1,5 +1,7 @@
 #include "daemon/camera/camera_unpack.h"
 
+#include <string.h>
+
 size_t camera_packed_row(int width, int bits)
 {
     if (width <= 0)
@@ -22,4 +24,30 @@ void camera_unpack_row(const uint8_t *in, uint8_t *out, int width, int bits)
             out[2 * (x + i) + 1] = (uint8_t)(value >> 8);
         }
     }
+}
+
+bool camera_copy_rows(const struct camera_rows *rows, uint8_t *out, int stride)
+{
+    const bool packed = rows->packed_bits > 0;
+    const size_t row = packed ? camera_packed_row(rows->packed_width, rows->packed_bits)
+                              : (size_t)(stride < rows->stride ? stride : rows->stride);
+
+    if (!packed && rows->stride == stride && rows->size >= (size_t)stride * (size_t)rows->count) {
+        memcpy(out, rows->bytes, (size_t)stride * (size_t)rows->count);
+        return true;
+    }
+    for (int y = 0; y < rows->count; y++) {
+        const size_t at = (size_t)y * (size_t)rows->stride;
+        uint8_t *to = out + (size_t)y * (size_t)stride;
+
+        if (at + row > rows->size) {
+            memset(to, 0, (size_t)(rows->count - y) * (size_t)stride);
+            return false;
+        }
+        if (packed)
+            camera_unpack_row(rows->bytes + at, to, rows->packed_width, rows->packed_bits);
+        else
+            memcpy(to, rows->bytes + at, row);
+    }
+    return true;
 }

@@ -263,44 +263,30 @@ static struct lumi_camera_frame *lend(struct v4l2_lent *lent, size_t size, size_
     return frame;
 }
 
-/* Rows of one plane from the driver's stride to the frame's; what is not there stays black and is told. */
-static bool copy_rows(const struct v4l2_camera *camera, const uint8_t *in, size_t size, int in_stride, int rows,
-                      uint8_t *out)
-{
-    const int stride = camera->format.stride;
-    const bool packed = camera->pixel->packed;
-    const size_t row = packed ? camera_packed_row(camera->format.width, camera->pixel->bits)
-                              : (size_t)(stride < in_stride ? stride : in_stride);
-
-    if (!packed && in_stride == stride && size >= (size_t)stride * (size_t)rows) {
-        memcpy(out, in, (size_t)stride * (size_t)rows);
-        return true;
-    }
-    for (int y = 0; y < rows; y++) {
-        const size_t at = (size_t)y * (size_t)in_stride;
-        uint8_t *to = out + (size_t)y * (size_t)stride;
-
-        if (at + row > size) {
-            memset(to, 0, (size_t)(rows - y) * (size_t)stride);
-            return false;
-        }
-        if (packed)
-            camera_unpack_row(in + at, to, camera->format.width, camera->pixel->bits);
-        else
-            memcpy(to, in + at, row);
-    }
-    return true;
-}
-
 struct arrived { /* a plane */
     const uint8_t *bytes;
     size_t size;
 };
 
+static bool copy_plane(const struct v4l2_camera *camera, const struct arrived *plane, int stride, int count,
+                       uint8_t *out)
+{
+    const bool packed = camera->pixel->packed;
+    const struct camera_rows rows = {.bytes = plane->bytes,
+                                     .size = plane->size,
+                                     .stride = stride,
+                                     .count = count,
+                                     .packed_width = camera->format.width,
+                                     .packed_bits = packed ? camera->pixel->bits : 0};
+
+    return camera_copy_rows(&rows, out, camera->format.stride);
+}
+
 static struct lumi_camera_frame *copy(struct v4l2_camera *camera, const struct arrived planes[PLANES])
 {
     const struct lumi_frame_format *format = &camera->format;
     const size_t whole = lumi_frame_bytes(format);
+    const bool two = camera->pixel->planes == 2;
     struct lumi_camera_frame *frame = camera_pool_take(camera->pool, whole ? whole : planes[0].size);
     uint8_t *out;
     bool all;
@@ -309,19 +295,15 @@ static struct lumi_camera_frame *copy(struct v4l2_camera *camera, const struct a
         return NULL;
     out = camera_pool_bytes(frame);
     if (!whole) {
-        memcpy(out, planes[0].bytes, planes[0].size);
+        if (planes[0].size)
+            memcpy(out, planes[0].bytes, planes[0].size);
         return frame;
     }
-    if (format->layout == LUMI_LAYOUT_NV12 && camera->pixel->planes == 2) {
-        const size_t luma = (size_t)format->stride * (size_t)format->height;
-
-        all = copy_rows(camera, planes[0].bytes, planes[0].size, camera->plane_stride[0], format->height, out);
-        all &= copy_rows(camera, planes[1].bytes, planes[1].size, camera->plane_stride[1], (format->height + 1) / 2,
-                         out + luma);
-    } else {
-        all = copy_rows(camera, planes[0].bytes, planes[0].size, camera->plane_stride[0],
-                        (int)(whole / (size_t)format->stride), out);
-    }
+    all = copy_plane(camera, &planes[0], camera->plane_stride[0],
+                     two ? format->height : (int)(whole / (size_t)format->stride), out);
+    if (two)
+        all &= copy_plane(camera, &planes[1], camera->plane_stride[1], (format->height + 1) / 2,
+                          out + (size_t)format->stride * (size_t)format->height);
     frame->damaged = !all;
     return frame;
 }
