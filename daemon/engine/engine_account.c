@@ -64,6 +64,7 @@ void engine_account_free(struct lumi_engine *e)
     if (e->frames)
         for (size_t i = 0; i < (size_t)e->shots * (size_t)e->config.camera_count; i++)
             lumi_free(e->frames[i].reason);
+    engine_judge_forget(e);
     lumi_free(e->frames);
     lumi_free(e->account_shots);
     lumi_free(e->names);

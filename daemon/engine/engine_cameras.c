@@ -156,6 +156,7 @@ void lumi_engine_sync_edge(struct lumi_engine *e, int64_t now_ns, int camera, in
     if (lost && engine_taking(e))
         engine_incident(e, camera, "sync", "%u sync edges of camera %s were lost on the way", lost,
                         e->config.cameras[camera].name);
+    e->cameras[camera].edge_seen |= e->stage == STAGE_TRIGGERS && e->test_camera == camera;
     if (e->cameras[camera].match && engine_taking(e))
         lumi_match_edge(e->cameras[camera].match, at_ns);
     engine_step(e);

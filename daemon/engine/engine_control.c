@@ -106,8 +106,8 @@ int lumi_engine_pause(struct lumi_engine *e, int64_t now_ns, struct lumi_error *
         return lumi_fail(error, LUMI_ERR_BUSY, "there is no sweep to pause (%s)", lumi_engine_state_name(e->state));
     set_session(e, "paused");
     e->go_on = false;
-    if (e->stage == STAGE_SWEEP) {
-        e->want_pause = true;
+    if (e->stage == STAGE_SWEEP || e->stage == STAGE_START) {
+        e->want_pause = true; /* when it has begun */
     } else {
         e->pause = PAUSE_OPERATOR;
         engine_go(e, STAGE_PAUSED);
@@ -167,8 +167,8 @@ int lumi_engine_stop(struct lumi_engine *e, int64_t now_ns, bool at_once, bool s
     e->want_stop = true;
     e->want_seal = seal;
     e->stop_at_once = at_once;
-    if (e->stage != STAGE_SWEEP && e->stage != STAGE_PAUSED && e->stage != STAGE_INTERRUPTED &&
-        e->stage != STAGE_AFTER && e->stage != STAGE_DRAIN) {
+    if (e->stage != STAGE_START && e->stage != STAGE_SWEEP && e->stage != STAGE_PAUSED &&
+        e->stage != STAGE_INTERRUPTED && e->stage != STAGE_AFTER && e->stage != STAGE_DRAIN) {
         if (!engine_board_rests(e) && e->connected) { /* homing, or about to start */
             lumi_wire_Request request = {.which_command = lumi_wire_Request_stop_tag};
             request.command.stop.at_once = at_once;

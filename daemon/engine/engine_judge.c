@@ -267,9 +267,9 @@ void lumi_engine_judged(struct lumi_engine *e, int64_t now_ns, uint64_t id, int 
         return;
     }
     e->judging--;
-    if (job->shot < 0)
+    if (job->shot == -1)
         engine_test_judged(e, job->camera, code, text, numbers);
-    else if (e->frames && job->shot < e->shots)
+    else if (e->frames && job->shot >= 0)
         take_verdict(e, job, code, text, numbers);
     if (picture && job->shot >= 0 && e->frames)
         keep_picture(e->cameras + job->camera, job, picture);
@@ -280,6 +280,12 @@ void lumi_engine_judged(struct lumi_engine *e, int64_t now_ns, uint64_t id, int 
     engine_held_drop(job->held);
     job->used = false;
     engine_step(e);
+}
+
+void engine_judge_forget(struct lumi_engine *e)
+{
+    for (int i = 0; i < ENGINE_JUDGING; i++)
+        e->jobs[i].shot = -2;
 }
 
 /* Before the engine goes: nobody answers any more. */

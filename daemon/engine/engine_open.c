@@ -38,6 +38,7 @@ static int allocate(struct lumi_engine *e, struct lumi_error *error)
     e->want_pause = e->want_stop = false;
     e->pause = PAUSE_NONE;
     e->judge_due = 0;
+    e->check_rig = false;
     return LUMI_OK;
 }
 
@@ -226,6 +227,7 @@ int engine_reopen(struct lumi_engine *e, const char *path, struct lumi_error *er
     struct lumi_capture *capture = NULL;
     int code;
 
+    engine_account_free(e); /* while the plan is still that of before */
     snprintf(e->capture, sizeof e->capture, "%s", path);
     LUMI_TRY(lumi_capture_open(path, LUMI_CAPTURE_WRITE, &capture, error));
     LUMI_GOTO(code, failed, read_plan(e, capture, error));
@@ -233,6 +235,7 @@ int engine_reopen(struct lumi_engine *e, const char *path, struct lumi_error *er
     LUMI_GOTO(code, failed, read_rows(e, capture, error));
     LUMI_GOTO(code, failed, lumi_capture_set_meta(capture, "session", "taking", error));
     LUMI_GOTO(code, failed, lumi_store_open(capture, &e->config.store, &e->store, error));
+    e->check_rig = true;
     engine_match_begin(e);
     settle_rows(e);
     return LUMI_OK;

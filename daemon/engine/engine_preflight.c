@@ -309,6 +309,7 @@ bool engine_stage_cameras(struct lumi_engine *e)
             e->cameras[c].command_code = LUMI_OK;
             e->cameras[c].frame_bytes = 0;
             e->cameras[c].seen = 0;
+            e->cameras[c].edge_seen = false;
         }
     }
     for (int c = 0; c < e->config.camera_count; c++)

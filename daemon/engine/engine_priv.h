@@ -133,7 +133,8 @@ struct engine_camera {
     struct engine_held **files; /* FILE frames, matched when the sweep is over */
     int file_count, file_room;
     int64_t file_ns; /* when the last came */
-    uint32_t seen;   /* bit a camera whose trigger it answered in the test */
+    uint32_t seen;   /* bit a camera that answered its trigger in the test */
+    bool edge_seen;  /* of its sync line, in the test */
     size_t frame_bytes;
     struct engine_held *test;
     struct engine_picture *pictures[ENGINE_PICTURES];
@@ -199,7 +200,9 @@ struct lumi_engine {
     int shots;
     uint8_t *board_shots; /* as the board says */
     uint8_t *drive_states;
-    bool driving; /* drive_sweep is to be answered */
+    bool driving;       /* the sweep is a drive's */
+    uint32_t drive_out; /* number of the drive_sweep that is to be answered; 0 none */
+    bool check_rig;     /* the capture's profile has not been compared with the board's yet */
     char name[256], title[256];
     char **override;
     int override_count;
@@ -319,6 +322,7 @@ struct engine_judging {
 #define ENGINE_JUDGING 32
 void engine_judge(struct lumi_engine *e, int shot, int camera, struct engine_held *held);
 void engine_judge_due(struct lumi_engine *e);
+void engine_judge_forget(struct lumi_engine *e); /* verdicts that are still to come are of no account */
 void engine_judge_reset(struct lumi_engine *e);
 
 /* ---- the stages ---- */
@@ -358,7 +362,7 @@ void engine_take(struct lumi_engine *e); /* whatever is needed is taken */
 void engine_interrupt(struct lumi_engine *e, bool go_on, const char *format, ...) __attribute__((format(printf, 3, 4)));
 bool engine_taking(const struct lumi_engine *e); /* a capture is open and under way */
 void engine_watch(struct lumi_engine *e);        /* faults, board, disk, cameras */
-void engine_ended(struct lumi_engine *e, lumi_wire_SweepEnded_How how);
+void engine_ended(struct lumi_engine *e, const lumi_wire_Event *event);
 void engine_restarted(struct lumi_engine *e);
 bool engine_disk_eased(const struct lumi_engine *e);
 void engine_sweep_row(struct lumi_engine *e, bool ended, const char *text);

@@ -43,6 +43,8 @@ void lumi_engine_rig_reply(struct lumi_engine *e, int64_t now_ns, uint32_t numbe
                            const lumi_wire_Reply *reply)
 {
     e->now = now_ns > e->now ? now_ns : e->now;
+    if (number && number == e->drive_out)
+        e->drive_out = 0;
     if (number && number == e->side) {
         e->side = 0;
         side_failed(e, code, text);
@@ -58,12 +60,27 @@ void lumi_engine_rig_reply(struct lumi_engine *e, int64_t now_ns, uint32_t numbe
     engine_step(e);
 }
 
+static bool same_profile(const struct lumi_engine *e, const struct lumi_rig *rig)
+{
+    char *texts = lumi_alloc(2, LUMI_RIG_TEXT_MAX);
+    bool same;
+
+    if (!texts)
+        return false;
+    lumi_rig_print(&e->rig, texts, LUMI_RIG_TEXT_MAX);
+    lumi_rig_print(rig, texts + LUMI_RIG_TEXT_MAX, LUMI_RIG_TEXT_MAX);
+    same = !strcmp(texts, texts + LUMI_RIG_TEXT_MAX);
+    lumi_free(texts);
+    return same;
+}
+
 void lumi_engine_rig_profile(struct lumi_engine *e, int64_t now_ns, uint32_t number, int code, const char *text,
                              const struct lumi_rig *rig)
 {
-    if (number && number == e->ask.number && !e->ask.answered && code == LUMI_OK && rig && !e->store) {
-        e->rig = *rig;
-        e->rig_known = true;
+    if (number && number == e->ask.number && !e->ask.answered && code == LUMI_OK && rig) {
+        if (!e->store)
+            e->rig = *rig;
+        e->rig_known = !e->store || same_profile(e, rig);
     }
     lumi_engine_rig_reply(e, now_ns, number, code, text, NULL);
 }
@@ -204,7 +221,7 @@ static void take_event(struct lumi_engine *e, struct engine_event *event)
         lumi_wire_copy_text(e->home_text, sizeof e->home_text, told->kind.homed.text);
         break;
     case lumi_wire_Event_sweep_ended_tag:
-        engine_ended(e, told->kind.sweep_ended.how);
+        engine_ended(e, told);
         break;
     default:
         break;

@@ -35,6 +35,7 @@ void engine_restarted(struct lumi_engine *e)
 {
     if (!engine_taking(e) || e->stage == STAGE_DRAIN || e->stage == STAGE_INTERRUPTED)
         return;
+    e->moving = false;
     if (e->want_stop) {
         engine_go(e, STAGE_DRAIN);
         return;
@@ -44,12 +45,14 @@ void engine_restarted(struct lumi_engine *e)
     engine_interrupt(e, true, "the board has started again");
 }
 
-void engine_ended(struct lumi_engine *e, lumi_wire_SweepEnded_How how)
+void engine_ended(struct lumi_engine *e, const lumi_wire_Event *event)
 {
-    if (e->driving || !e->moving)
+    const int64_t at = e->ports.rig_to_host(e->ports.context, event->time_ns);
+
+    if (e->driving || !e->moving || (at && at < e->begun_ns)) /* of a sweep before */
         return;
     e->ended = true;
-    e->how = how;
+    e->how = event->kind.sweep_ended.how;
 }
 
 /* ---- the disk ---- */

@@ -17,7 +17,7 @@ void engine_take(struct lumi_engine *e)
     e->pause = PAUSE_NONE;
     e->go_on = false;
     e->ended = false;
-    engine_go(e, STAGE_ROWS);
+    engine_go(e, engine_frames_needed(e) > 0 ? STAGE_ROWS : STAGE_DRAIN);
 }
 
 /* What is said about a board that did not do as it was asked; true: handled. */
@@ -116,6 +116,7 @@ bool engine_stage_home(struct lumi_engine *e)
             /* It goes on with what this program started before it died. */
             if (e->link.status.plan_crc == lumi_wire_plan_crc(&e->plan)) {
                 engine_go(e, STAGE_SWEEP);
+                e->begun_ns = e->rest_ns = (int64_t)e->link.status_ns;
                 e->moving = true;
                 return true;
             }
@@ -170,7 +171,7 @@ static bool arm(struct lumi_engine *e, int camera)
     const double exposure = first_exposure(e);
     const char *name = e->config.cameras[camera].name;
 
-    if (c->command)
+    if (c->command && c->there)
         return c->given_up;
     if (!c->there) {
         double patience = e->config.cameras[camera].optional ? ARM_SECONDS : e->config.rig_patience;
@@ -223,10 +224,32 @@ bool engine_stage_arm(struct lumi_engine *e)
 
 /* ---- load, read, mark, start ---- */
 
+/* A capture that was opened again is of a rig: is this it? */
+static bool same_rig(struct lumi_engine *e)
+{
+    if (!engine_asked(e)) {
+        e->ask = (struct engine_ask){.number = ++e->next_number};
+        e->ports.rig_read_profile(e->ports.context, e->ask.number);
+        return false;
+    }
+    if (!e->ask.answered || refused(e, "the profile"))
+        return false;
+    engine_ask_none(e);
+    e->check_rig = false;
+    if (e->rig_known)
+        return true;
+    e->rig_known = true;
+    engine_interrupt(e, false, "the board's profile is not the capture's: this is another rig, or it was changed");
+    e->check_rig = true;
+    return false;
+}
+
 bool engine_stage_load(struct lumi_engine *e)
 {
     lumi_wire_Request request = {.which_command = lumi_wire_Request_load_plan_tag};
 
+    if (e->check_rig && !same_rig(e))
+        return e->stage != STAGE_LOAD;
     if (!engine_asked(e)) {
         request.command.load_plan.has_plan = true;
         lumi_wire_from_plan(&e->plan, &request.command.load_plan.plan);
@@ -337,6 +360,7 @@ static void begin_driving(struct lumi_engine *e, int first)
         e->drive_states[shot] = !engine_shot_needed(e, shot);
     e->driving = true;
     e->ask = (struct engine_ask){.number = ++e->next_number};
+    e->drive_out = e->ask.number;
     e->ports.drive_sweep(e->ports.context, e->ask.number, &e->rig, &e->plan, (uint32_t)first, e->drive_states);
 }
 
@@ -344,6 +368,9 @@ static bool ask_start(struct lumi_engine *e)
 {
     lumi_wire_Request request = {.which_command = lumi_wire_Request_start_sweep_tag};
     int first = 0;
+
+    if (e->drive_out) /* one that was cancelled is still on its way to an end */
+        return false;
 
     while (first < e->shots && !engine_shot_needed(e, first))
         first++;
@@ -378,9 +405,10 @@ static bool ask_start(struct lumi_engine *e)
 
 bool engine_stage_start(struct lumi_engine *e)
 {
+    if (!engine_asked(e) && ask_start(e))
+        return true;
     if (!engine_asked(e))
-        if (ask_start(e))
-            return true;
+        return false;
     if (e->driving) { /* answered when it is over */
         struct engine_ask ask = e->ask;
         engine_state(e, LUMI_ENGINE_SWEEPING, e->round ? "retakes, round %d" : "the sweep", e->round);

@@ -89,6 +89,9 @@ static void tell_seen(struct lumi_engine *e, int camera)
     } else {
         check(e, camera, LUMI_RED, "trigger", "no frame came of its trigger");
     }
+    if (e->config.cameras[camera].sync_line)
+        check(e, camera, c->edge_seen ? LUMI_GREEN : LUMI_YELLOW, "sync",
+              c->edge_seen ? "its edge was seen" : "no edge of its exposure was seen");
 }
 
 static bool testable(struct lumi_engine *e, int camera)
