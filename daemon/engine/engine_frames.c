@@ -148,6 +148,7 @@ static void take_hit(struct lumi_engine *e, int camera, const struct lumi_match_
         return;
     }
     if (held->frame->damaged) {
+        engine_incident(e, camera, "damaged", "the frame of shot %d from %s came damaged", result->shot, name);
         engine_frame_lost(e, result->shot, camera, "it came damaged: %u packets are missing",
                           held->frame->packets_missing);
         engine_held_drop(held);

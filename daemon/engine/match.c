@@ -5,9 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-#define LATE_LEAST 0.25 /* s over the usual delay until a frame is called late */
-#define PERIOD_NEW 0.2  /* share of a new interval in the period of frames that come by themselves */
+#define PERIOD_NEW 0.2 /* share of a new interval in the period of frames that come by themselves */
 #define PERIOD_MOST_NS 2e9
+#define CLOCK_SLACK 0.02 /* s, a fitted clock may be wrong by: jitter of drivers that take the time late */
+#define PRIOR_SLACK 0.15 /* before any frame of a sweep was matched */
+#define LATE_LEAST 0.25  /* s over the usual delay until a frame is called late */
 
 void lumi_match_options_init(struct lumi_match_options *options)
 {
@@ -117,10 +119,23 @@ double match_half(const struct lumi_match *match)
     return (match->options.window > 0 ? match->options.window : match->options.spacing) / 2;
 }
 
-/* Index of the exposure nearest to `at` within half a window, or −1; `open`: only those without a frame. */
-int match_nearest(const struct lumi_match *match, int64_t at, bool open)
+/* How far a frame may be from its exposure by the camera's clock: what the line has missed so far, and what a drift
+ * that is not known yet can do. A frame that nobody asked for may lie anywhere between two exposures. */
+static double clock_slack(const struct lumi_match *match, int64_t device_ns)
 {
-    double best = match_half(match);
+    const double half = match_half(match);
+    double slack = match->pair_count ? CLOCK_SLACK : PRIOR_SLACK;
+
+    if (match->residual_count)
+        slack += 6 * sqrt(match->residual_sum / (double)match->residual_count);
+    if (match->drift == 0)
+        slack += 2e-4 * fabs((double)(device_ns - match->device_at) * 1e-9);
+    return slack < half ? slack : half;
+}
+
+/* Index of the exposure nearest to `at` within `best` seconds, or −1; `open`: only those without a frame. */
+static int nearest_within(const struct lumi_match *match, int64_t at, double best, bool open)
+{
     int found = -1;
 
     for (int i = 0; i < match->exposure_count; i++) {
@@ -131,6 +146,11 @@ int match_nearest(const struct lumi_match *match, int64_t at, bool open)
         }
     }
     return found;
+}
+
+int match_nearest(const struct lumi_match *match, int64_t at, bool open)
+{
+    return nearest_within(match, at, match_half(match), open);
 }
 
 static bool could_be(const struct lumi_match *match, int i, const struct lumi_match_frame *frame)
@@ -246,7 +266,7 @@ static int decide(struct lumi_match *match, int place, int64_t now)
     if (!match->options.device_clock || frame->device_ns == LUMI_MATCH_NO_TIME || !match->clock_known)
         return by_arrival(match, place, now);
     int64_t at = match_to_host(match, frame->device_ns);
-    int near = match_nearest(match, at, false);
+    int near = nearest_within(match, at, clock_slack(match, frame->device_ns), false);
     if (near >= 0)
         return match->exposures[near].matched ? TWICE : near;
     if (match_clock_stepped(match, place, now))
