@@ -8,25 +8,16 @@
 #include <string.h>
 
 static const engine_stage_fn stages[ENGINE_STAGES] = {
-    [STAGE_LINK] = engine_stage_link,
-    [STAGE_PROFILE] = engine_stage_profile,
-    [STAGE_CAMERAS] = engine_stage_cameras,
-    [STAGE_TRIGGERS] = engine_stage_triggers,
-    [STAGE_VERDICT] = engine_stage_verdict,
-    [STAGE_ROWS] = engine_stage_rows,
-    [STAGE_HOME] = engine_stage_home,
-    [STAGE_ARM] = engine_stage_arm,
-    [STAGE_LOAD] = engine_stage_load,
-    [STAGE_READ] = engine_stage_read,
-    [STAGE_MARK] = engine_stage_mark,
-    [STAGE_START] = engine_stage_start,
-    [STAGE_SWEEP] = engine_stage_sweep,
-    [STAGE_PAUSED] = engine_stage_paused,
-    [STAGE_INTERRUPTED] = engine_stage_interrupted,
-    [STAGE_AFTER] = engine_stage_after,
-    [STAGE_DRAIN] = engine_stage_drain,
-    [STAGE_SEAL] = engine_stage_seal,
-    [STAGE_CLOSE] = engine_stage_close,
+    [STAGE_LINK] = engine_stage_link,       [STAGE_PROFILE] = engine_stage_profile,
+    [STAGE_CAMERAS] = engine_stage_cameras, [STAGE_TRIGGERS] = engine_stage_triggers,
+    [STAGE_VERDICT] = engine_stage_verdict, [STAGE_ROWS] = engine_stage_rows,
+    [STAGE_HOME] = engine_stage_home,       [STAGE_ARM] = engine_stage_arm,
+    [STAGE_TEST] = engine_stage_test,       [STAGE_LOAD] = engine_stage_load,
+    [STAGE_READ] = engine_stage_read,       [STAGE_MARK] = engine_stage_mark,
+    [STAGE_START] = engine_stage_start,     [STAGE_SWEEP] = engine_stage_sweep,
+    [STAGE_PAUSED] = engine_stage_paused,   [STAGE_INTERRUPTED] = engine_stage_interrupted,
+    [STAGE_AFTER] = engine_stage_after,     [STAGE_DRAIN] = engine_stage_drain,
+    [STAGE_SEAL] = engine_stage_seal,       [STAGE_CLOSE] = engine_stage_close,
 };
 
 void lumi_engine_config_init(struct lumi_engine_config *config)

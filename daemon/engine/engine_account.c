@@ -180,6 +180,7 @@ static void failed(struct lumi_engine *e, struct engine_flight *flight, int code
             engine_frame_lost(e, shot, camera, "could not be stored: %s", text);
     } else if (kind == LUMI_STORE_RETAKE) {
         engine_frame_at(e, shot, camera)->flying = false;
+        engine_frame_at(e, shot, camera)->stuck = true;
         engine_tell(e, LUMI_TALE_INCIDENT, -1, camera, text);
     } else {
         engine_tell(e, LUMI_TALE_INCIDENT, -1, camera, text);
@@ -229,6 +230,17 @@ static void stored(struct lumi_engine *e, struct engine_flight *flight, const st
         engine_judge(e, flight->shot, flight->camera, flight->held);
 }
 
+/* As lumi_capture_retake_frame calls it: NAME.2, NAME.3 … */
+static void rename_retake(char name[LUMI_CAPTURE_NAME], int retakes)
+{
+    size_t length = strlen(name);
+    char *dot = retakes > 1 ? strrchr(name, '.') : NULL;
+
+    if (dot)
+        length = (size_t)(dot - name);
+    snprintf(name + length, LUMI_CAPTURE_NAME - length, ".%d", retakes + 1);
+}
+
 static void retake_row(struct lumi_engine *e, struct engine_flight *flight, const struct lumi_store_done *done)
 {
     struct engine_frame *frame = engine_frame_at(e, flight->shot, flight->camera);
@@ -237,9 +249,8 @@ static void retake_row(struct lumi_engine *e, struct engine_flight *flight, cons
     frame->row = done->frame;
     frame->dead_row = false;
     frame->exposed_ns = LUMI_NO_TIME;
-    char *name = e->names[(size_t)flight->shot * (size_t)e->config.camera_count + (size_t)flight->camera];
-    if (strlen(name) + 3 < LUMI_CAPTURE_NAME)
-        strcat(name, ".2"); /* as lumi_capture_retake_frame calls it */
+    rename_retake(e->names[(size_t)flight->shot * (size_t)e->config.camera_count + (size_t)flight->camera],
+                  ++frame->retakes);
     engine_frame_go(e, flight->shot, flight->camera, AT_PLANNED, NULL);
 }
 

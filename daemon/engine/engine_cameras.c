@@ -81,6 +81,7 @@ static void came(struct lumi_engine *e, int camera, const struct lumi_camera_not
     c->there = true;
     c->given_up = false;
     c->identity = notice->identity;
+    c->trusted = false;
     if (c->match)
         lumi_match_restart(c->match);
 }

@@ -251,9 +251,7 @@ static void reject_chosen(struct lumi_engine *e)
 int lumi_engine_retake(struct lumi_engine *e, int64_t now_ns, const char *capture, const char *const *frames,
                        struct lumi_error *error)
 {
-    struct lumi_error ignored;
     char path[1400];
-    int code;
 
     e->now = now_ns > e->now ? now_ns : e->now;
     if (!resting(e))
@@ -266,12 +264,13 @@ int lumi_engine_retake(struct lumi_engine *e, int64_t now_ns, const char *captur
         return lumi_fail(error, LUMI_ERR_NOTFOUND, "no capture is named, and none was taken");
     for (int c = 0; c < LUMI_RIG_CAMERAS; c++)
         engine_camera_reset(e, c);
+    /* Nothing is unsealed for nothing. */
+    LUMI_TRY(engine_look(e, path, error));
+    LUMI_TRY(choose(e, frames, error));
+    if (!e->chosen && engine_frames_needed(e) + e->at_count[AT_TRIGGERED] == 0)
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: nothing is missing or rejected", path);
     LUMI_TRY(engine_reopen(e, path, error));
-    LUMI_GOTO(code, failed, choose(e, frames, error));
-    if (!e->chosen && engine_frames_needed(e) == 0) {
-        code = lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: nothing is missing or rejected", path);
-        goto failed;
-    }
+    LUMI_TRY(choose(e, frames, error));
     reject_chosen(e);
     e->round = 1;
     e->retakes_left = e->config.retakes > 0 ? e->config.retakes - 1 : 0;
@@ -282,10 +281,4 @@ int lumi_engine_retake(struct lumi_engine *e, int64_t now_ns, const char *captur
     e->stage_ns = INT64_MIN;
     engine_step(e);
     return LUMI_OK;
-failed:
-    engine_go(e, STAGE_CLOSE);
-    e->stage_at = 1;
-    (void)ignored;
-    engine_step(e);
-    return code;
 }

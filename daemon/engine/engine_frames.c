@@ -39,7 +39,7 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
 
     if (!frame)
         return;
-    if (e->stage == STAGE_TRIGGERS) {
+    if (e->stage == STAGE_TRIGGERS || (e->stage == STAGE_TEST && e->test_camera >= 0)) {
         engine_test_frame(e, camera, frame);
         return;
     }
@@ -168,6 +168,7 @@ static void take_hit(struct lumi_engine *e, int camera, const struct lumi_match_
 
 static void take_dropped(struct lumi_engine *e, int camera, const struct lumi_match_result *result)
 {
+    e->cameras[camera].misses++;
     if (engine_frame_at(e, result->shot, camera)->at != AT_TRIGGERED)
         return;
     engine_incident(e, camera, "dropped", "no frame of shot %d came from %s", result->shot,
@@ -204,6 +205,7 @@ static void take_result(struct lumi_engine *e, int camera, const struct lumi_mat
         engine_held_drop(result->frame);
         break;
     case LUMI_MATCH_SURPLUS:
+        e->cameras[camera].misses++;
         if (e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_FREE)
             ; /* as most of them */
         else if (e->cameras[camera].surplus++ < TELL_BY_NAME)

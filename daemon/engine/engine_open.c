@@ -5,6 +5,7 @@
 #include <dirent.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
@@ -74,6 +75,7 @@ static void place(struct lumi_engine *e, size_t i, const struct lumi_capture_fra
         break;
     }
     frame->row = row->id;
+    frame->retakes = row->retake_of ? atoi(strrchr(row->name, '.') ? strrchr(row->name, '.') + 1 : "") - 1 : 0;
     if (row->exposed_time_us != LUMI_NO_TIME)
         frame->exposed_ns = row->exposed_time_us * 1000 - e->utc_offset;
     snprintf(e->names[i], sizeof e->names[i], "%s", row->name);
@@ -222,6 +224,22 @@ static void settle_rows(struct lumi_engine *e)
         }
 }
 
+int engine_look(struct lumi_engine *e, const char *path, struct lumi_error *error)
+{
+    struct lumi_capture *capture = NULL;
+    int code;
+
+    engine_account_free(e);
+    snprintf(e->capture, sizeof e->capture, "%s", path);
+    LUMI_TRY(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, error));
+    LUMI_GOTO(code, done, read_plan(e, capture, error));
+    LUMI_GOTO(code, done, allocate(e, error));
+    LUMI_GOTO(code, done, read_rows(e, capture, error));
+done:
+    lumi_capture_close(capture);
+    return code;
+}
+
 int engine_reopen(struct lumi_engine *e, const char *path, struct lumi_error *error)
 {
     struct lumi_capture *capture = NULL;
@@ -237,6 +255,8 @@ int engine_reopen(struct lumi_engine *e, const char *path, struct lumi_error *er
     LUMI_GOTO(code, failed, lumi_store_open(capture, &e->config.store, &e->store, error));
     e->check_rig = true;
     engine_match_begin(e);
+    for (int c = 0; c < e->config.camera_count; c++)
+        e->cameras[c].trusted = false;
     settle_rows(e);
     return LUMI_OK;
 failed:

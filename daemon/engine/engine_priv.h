@@ -35,6 +35,7 @@ enum engine_stage {
     STAGE_ROWS, /* retakes get their rows */
     STAGE_HOME,
     STAGE_ARM,
+    STAGE_TEST, /* a test shot for cameras of whose clock nothing is known any more */
     STAGE_LOAD,
     STAGE_READ,
     STAGE_MARK,
@@ -47,7 +48,7 @@ enum engine_stage {
     STAGE_SEAL,
     STAGE_CLOSE
 };
-#define ENGINE_STAGES 20
+#define ENGINE_STAGES 21
 
 /* Where a planned frame is. */
 enum engine_at {
@@ -69,6 +70,8 @@ struct engine_frame {
     bool flying;        /* its row is wanted of the store (retake) */
     bool judge_due;     /* stored, to be judged from its file */
     bool judging;
+    bool stuck;   /* the store makes no row for another attempt */
+    int retakes;  /* rows before this one */
     char *reason; /* NULL: none */
 };
 
@@ -134,6 +137,8 @@ struct engine_camera {
     int file_count, file_room;
     int64_t file_ns; /* when the last came */
     uint32_t seen;   /* bit a camera that answered its trigger in the test */
+    bool trusted;    /* where its clock or count stands is known */
+    uint32_t misses; /* frames that never came, and frames of no shot, since */
     bool edge_seen;  /* of its sync line, in the test */
     size_t frame_bytes;
     struct engine_held *test;
@@ -335,6 +340,7 @@ bool engine_stage_verdict(struct lumi_engine *e);
 bool engine_stage_rows(struct lumi_engine *e);
 bool engine_stage_home(struct lumi_engine *e);
 bool engine_stage_arm(struct lumi_engine *e);
+bool engine_stage_test(struct lumi_engine *e);
 bool engine_stage_load(struct lumi_engine *e);
 bool engine_stage_read(struct lumi_engine *e);
 bool engine_stage_mark(struct lumi_engine *e);
@@ -371,6 +377,7 @@ void engine_rest(struct lumi_engine *e, enum lumi_engine_state state);
 
 /* ---- engine_open.c ---- */
 int engine_make(struct lumi_engine *e, struct lumi_error *error); /* the capture of a plan that passed */
+int engine_look(struct lumi_engine *e, const char *path, struct lumi_error *error); /* its account, unchanged */
 int engine_reopen(struct lumi_engine *e, const char *path, struct lumi_error *error);
 
 #endif

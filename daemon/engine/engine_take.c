@@ -49,7 +49,7 @@ bool engine_stage_rows(struct lumi_engine *e)
         struct engine_frame *frame = e->frames + i;
         const int shot = (int)(i / (size_t)e->config.camera_count), camera = (int)(i % (size_t)e->config.camera_count);
         flying |= frame->flying;
-        if (frame->flying || frame->at == AT_PLANNED || !wanted(e, i))
+        if (frame->flying || frame->stuck || frame->at == AT_PLANNED || !wanted(e, i))
             continue;
         if (!frame->dead_row) {
             engine_frame_go(e, shot, camera, AT_PLANNED, NULL);
@@ -218,7 +218,7 @@ bool engine_stage_arm(struct lumi_engine *e)
         engine_wake(e, 0.5);
         return false;
     }
-    engine_go(e, STAGE_LOAD);
+    engine_go(e, STAGE_TEST);
     return true;
 }
 

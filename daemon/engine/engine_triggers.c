@@ -10,7 +10,10 @@
 #define TEST_SECONDS 3.0   /* until a frame of a test shot is not seen, at least */
 #define OTHERS_SECONDS 0.3 /* that others may answer too */
 #define TEST_AHEAD 0.002   /* s, from the board's answer to the first edge (firing.h, FIRING_MARGIN_TICKS) */
+#define DOUBT 2            /* misses until a camera is tested again */
 #define BUSY_TRIES 20
+#define BUSY_SECONDS 0.2
+#define TESTED 1000 /* stage_at when all are */
 
 static void check(struct lumi_engine *e, int camera, enum lumi_verdict verdict, const char *what, const char *text)
 {
@@ -37,6 +40,8 @@ void engine_test_frame(struct lumi_engine *e, int camera, struct lumi_camera_fra
     *held = (struct engine_held){.frame = frame, .users = 1, .bytes = frame->size};
     c->test = held;
     c->frame_bytes = frame->size;
+    c->trusted = true;
+    c->misses = 0;
     const struct lumi_rig_trigger *trigger = &e->rig.control.triggers[c->rig];
     int64_t exposed = e->test_ns + (int64_t)((TEST_AHEAD + trigger->focus_lead + trigger->shutter_lag) * 1e9);
     if (c->match && !c->identity.records_itself)
@@ -129,12 +134,17 @@ static void fire(struct lumi_engine *e)
     engine_ask(e, &request);
 }
 
-/* The next camera's turn; false: all have had theirs. */
+/* The next camera's turn; false: all have had theirs. Before a sweep that goes on only those whose clock is in doubt.
+ */
 static bool next_camera(struct lumi_engine *e)
 {
-    while (++e->test_camera < e->config.camera_count)
+    while (++e->test_camera < e->config.camera_count) {
+        const struct engine_camera *c = e->cameras + e->test_camera;
+        if (e->stage == STAGE_TEST && c->trusted && c->misses < DOUBT)
+            continue;
         if (testable(e, e->test_camera))
             return true;
+    }
     return false;
 }
 
@@ -167,7 +177,7 @@ static bool answered(struct lumi_engine *e)
 {
     if (e->ask.code == LUMI_ERR_BUSY && e->stage_at++ < BUSY_TRIES) { /* the one before is still going on */
         engine_ask_none(e);
-        engine_wake(e, 0.2);
+        engine_wake(e, BUSY_SECONDS);
         e->test_ns = 0;
         e->stage_ns = e->now;
         return false;
@@ -189,21 +199,20 @@ static bool answered(struct lumi_engine *e)
     return true;
 }
 
-bool engine_stage_triggers(struct lumi_engine *e)
+/* True: all have had their turn. */
+static bool test_all(struct lumi_engine *e)
 {
     if (e->stage_at == 0) {
         e->stage_at = 1;
         e->test_camera = -1;
-        if (e->faults || e->estop || !next_camera(e)) {
-            e->test_camera = -1;
-            engine_go(e, STAGE_VERDICT);
+        e->test_ns = 0;
+        if (e->faults || e->estop || !next_camera(e))
             return true;
-        }
     }
-    if (e->test_camera < e->config.camera_count) {
+    while (e->test_camera < e->config.camera_count) {
         if (!engine_asked(e)) {
-            if (engine_since(e, e->stage_ns) < 0.2 && e->stage_at > 1) {
-                engine_wake(e, 0.2);
+            if (e->stage_at > 1 && engine_since(e, e->stage_ns) < BUSY_SECONDS) {
+                engine_wake(e, BUSY_SECONDS);
                 return false;
             }
             fire(e);
@@ -213,15 +222,47 @@ bool engine_stage_triggers(struct lumi_engine *e)
             return false;
         engine_ask_none(e);
         e->stage_at = 1;
-        if (next_camera(e)) {
-            fire(e);
+        next_camera(e);
+    }
+    return true;
+}
+
+bool engine_stage_triggers(struct lumi_engine *e)
+{
+    if (e->stage_at < TESTED) {
+        for (int c = 0; c < e->config.camera_count && e->stage_at == 0; c++)
+            e->cameras[c].seen = 0;
+        if (!test_all(e))
             return false;
-        }
+        e->stage_at = TESTED;
+        e->test_camera = -1;
         judge_tests(e);
     }
     if (e->judging > 0)
         return false;
-    e->test_camera = -1;
     engine_go(e, STAGE_VERDICT);
+    return true;
+}
+
+/* What the cameras are still to send of what was before must not pass for an answer to a test. */
+bool engine_stage_test(struct lumi_engine *e)
+{
+    if (e->stage_at == 0) {
+        for (int c = 0; c < e->config.camera_count; c++)
+            if (e->cameras[c].used && e->cameras[c].match && lumi_match_open(e->cameras[c].match) > 0) {
+                engine_wake(e, 0.2);
+                return false;
+            }
+        for (int c = 0; c < e->config.camera_count; c++)
+            e->cameras[c].seen = 0;
+    }
+    if (!test_all(e))
+        return false;
+    e->test_camera = -1;
+    for (int c = 0; c < e->config.camera_count; c++) {
+        engine_held_drop(e->cameras[c].test);
+        e->cameras[c].test = NULL;
+    }
+    engine_go(e, STAGE_LOAD);
     return true;
 }

@@ -7,9 +7,10 @@
 
 #define PERIOD_NEW 0.2 /* share of a new interval in the period of frames that come by themselves */
 #define PERIOD_MOST_NS 2e9
-#define CLOCK_SLACK 0.02 /* s, a fitted clock may be wrong by: jitter of drivers that take the time late */
-#define PRIOR_SLACK 0.15 /* before any frame of a sweep was matched */
-#define LATE_LEAST 0.25  /* s over the usual delay until a frame is called late */
+#define CLOCK_SLACK 0.02  /* s, a fitted clock may be wrong by: jitter of drivers that take the time late */
+#define PRIOR_SLACK 0.15  /* before any frame of a sweep was matched */
+#define FIRST_LATENCY 0.5 /* s, of a camera of which nothing is known */
+#define LATE_LEAST 0.25   /* s over the usual delay until a frame is called late */
 
 void lumi_match_options_init(struct lumi_match_options *options)
 {
@@ -56,7 +57,6 @@ void lumi_match_restart(struct lumi_match *match)
     match->pair_count = match->pair_next = 0;
     match->clock_known = false;
     match->drift = 0;
-    match->last = NULL_EXPOSURE;
     match->sequence_known = false;
 }
 
@@ -161,6 +161,20 @@ static bool could_be(const struct lumi_match *match, int i, const struct lumi_ma
     return !e->matched && latency >= e->length - match->options.early && latency <= match->options.patience;
 }
 
+/* The only one that it can be; −1: none, or several. */
+static int only(const struct lumi_match *match, const struct lumi_match_frame *frame)
+{
+    int found = -1;
+
+    for (int i = 0; i < match->exposure_count; i++)
+        if (could_be(match, i, frame)) {
+            if (found >= 0)
+                return -1;
+            found = i;
+        }
+    return found;
+}
+
 /* The latest that it can be: delays are shorter than what lies between two exposures, or the camera would fall behind.
  */
 static int latest(const struct lumi_match *match, const struct lumi_match_frame *frame)
@@ -174,11 +188,11 @@ static int latest(const struct lumi_match *match, const struct lumi_match_frame 
 /* By the camera's own count, from the frame before; −1: it does not say. */
 static int by_sequence(const struct lumi_match *match, const struct lumi_match_frame *frame)
 {
-    if (!match->sequence_known || match->last < 0 || frame->sequence <= match->last_sequence ||
-        frame->sequence - match->last_sequence > (uint64_t)match->exposure_count)
+    if (!match->sequence_known || frame->sequence <= match->last_sequence ||
+        frame->sequence - match->last_sequence > MATCH_EXPOSURES)
         return -1;
     int64_t at = match->last + (int64_t)(frame->sequence - match->last_sequence);
-    return at < match->exposure_count && could_be(match, (int)at, frame) ? (int)at : -1;
+    return at >= 0 && at < match->exposure_count && could_be(match, (int)at, frame) ? (int)at : -1;
 }
 
 enum decision { WAIT = -1, NONE = -2, TWICE = -3 }; /* otherwise the exposure */
@@ -208,6 +222,9 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
         if (!overdue(match, frame, now, settle))
             return WAIT;
         int first = latest(match, frame);
+        if (first >= 0 &&
+            (double)(frame->host_ns - match->exposures[first].at) * 1e-9 > fmax(match->options.spacing, FIRST_LATENCY))
+            first = only(match, frame);
         return first >= 0 ? first : overdue(match, frame, now, match->options.patience) ? NONE : WAIT;
     }
     int timed = match_nearest(match, frame->host_ns - (int64_t)(match->latency * 1e9), false);
@@ -235,7 +252,7 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
         return WAIT;
     if (counted >= 0)
         return counted;
-    int last = latest(match, frame);
+    int last = only(match, frame); /* a frame of a wrong shot is worse than one that has to be taken again */
     return last >= 0 ? last : overdue(match, frame, now, match->options.patience) ? NONE : WAIT;
 }
 
@@ -375,7 +392,7 @@ bool match_prune(struct lumi_match *match, int64_t now)
         gone++;
     match->exposure_count -= gone;
     memmove(match->exposures, match->exposures + gone, (size_t)match->exposure_count * sizeof *match->exposures);
-    match->last = match->last >= gone ? match->last - gone : NULL_EXPOSURE;
+    match->last -= gone; /* below 0: before the first that is kept */
     return match->exposure_count < MATCH_EXPOSURES;
 }
 

@@ -85,6 +85,9 @@ void lumi_match_prior(struct lumi_match *match, const struct lumi_match_frame *f
 
     lumi_match_restart(match);
     match->latency = latency > 1e-6 ? latency : 1e-6;
+    match->last = match->exposure_count - 1; /* the next that it counts is the next exposure */
+    match->last_sequence = frame->sequence;
+    match->sequence_known = true;
     if (frame->device_ns == LUMI_MATCH_NO_TIME || !match->options.device_clock)
         return;
     match->device_at = frame->device_ns;

@@ -29,7 +29,7 @@ struct lumi_match {
     struct lumi_match_options options;
     struct match_exposure *exposures; /* by time */
     int exposure_count;
-    int last; /* the latest that has a frame; −1 */
+    int last; /* the latest that has a frame; below 0: before the first that is kept */
     uint64_t last_sequence;
     bool sequence_known;
     struct lumi_match_frame frames[MATCH_WAITING]; /* as they arrived */

@@ -354,17 +354,34 @@ static int retake_shot(struct lumi_capture *capture, int64_t frame, int64_t came
                           "ii", frame, *shot);
 }
 
+/* Without the number that it has if it is a retake itself. */
+static int first_name(struct lumi_capture *capture, int64_t frame, const char *name, char first[LUMI_CAPTURE_NAME],
+                      struct lumi_error *error)
+{
+    int64_t retake;
+    char *dot;
+
+    LUMI_TRY(
+        capture_db_int(capture, &retake, error, "SELECT retake_of IS NOT NULL FROM frames WHERE id = ?", "i", frame));
+    snprintf(first, LUMI_CAPTURE_NAME, "%s", name);
+    dot = retake ? strrchr(first, '.') : NULL;
+    if (dot && dot != first)
+        *dot = '\0';
+    return LUMI_OK;
+}
+
 static int insert_retake(struct lumi_capture *capture, int64_t frame, const char *old_name, int64_t *id,
                          struct lumi_error *error)
 {
     struct lumi_capture_new_frame again = {0};
-    char name[LUMI_CAPTURE_NAME + 24];
+    char name[LUMI_CAPTURE_NAME + 24], first[LUMI_CAPTURE_NAME];
     int64_t position, shot, taken;
     double exposure_offset;
 
     LUMI_TRY(read_for_retake(capture, frame, &again, &position, &exposure_offset, error));
+    LUMI_TRY(first_name(capture, frame, old_name, first, error));
     for (int n = 2;; n++) {
-        snprintf(name, sizeof name, "%s.%d", old_name, n);
+        snprintf(name, sizeof name, "%s.%d", first, n);
         LUMI_TRY(capture_db_int(capture, &taken, error, "SELECT count(*) FROM frames WHERE name = ?", "t", name));
         if (!taken)
             break;
