@@ -75,7 +75,7 @@ static int allocate(const char *path, const char *suffix, struct lumi_capture **
 static void release(struct lumi_capture *capture)
 {
     capture_drop_pending(capture, false);
-    sqlite3_close(capture->db);
+    capture_db_close(capture);
     if (capture->frames_fd >= 0)
         close(capture->frames_fd);
     if (capture->dir_fd >= 0)
@@ -223,8 +223,7 @@ int lumi_capture_create_live(const char *path, struct lumi_capture **capture, st
 
 fail:
     lumi_free(data);
-    sqlite3_close(made->db);
-    made->db = NULL;
+    capture_db_close(made);
     capture_remove_tree(made->path, NULL);
     release(made);
     return code;
@@ -294,7 +293,7 @@ static int upgrade_copy(struct lumi_capture *capture, struct lumi_error *error)
         sqlite3_close(copy);
         return code;
     }
-    sqlite3_close(capture->db);
+    capture_db_close(capture);
     capture->db = copy;
     return harden(capture, error);
 }
@@ -317,8 +316,7 @@ static int open_for_writing(struct lumi_capture *capture, struct lumi_error *err
     LUMI_TRY(open_directory(capture, true, error));
     LUMI_TRY(open_database(capture, SQLITE_OPEN_READWRITE, error));
     LUMI_TRY(check_version(capture, LUMI_CAPTURE_READ, error)); /* nothing is unsealed for what cannot be opened */
-    sqlite3_close(capture->db);
-    capture->db = NULL;
+    capture_db_close(capture);
     LUMI_TRY(open_frames(capture, error));
     LUMI_TRY(capture_unseal(capture, error));
     LUMI_TRY(open_database(capture, SQLITE_OPEN_READWRITE, error));
@@ -459,8 +457,7 @@ void lumi_capture_close(struct lumi_capture *capture)
         return;
     lumi_capture_rollback(capture, false);
     if (capture->final_path) {
-        sqlite3_close(capture->db);
-        capture->db = NULL;
+        capture_db_close(capture);
         capture_remove_tree(capture->path, NULL);
     }
     release(capture);

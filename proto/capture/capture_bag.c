@@ -126,8 +126,7 @@ static int close_database(struct lumi_capture *capture, struct lumi_error *error
         return lumi_fail(error, LUMI_ERR_BUSY, "%s: somebody is reading the capture; it cannot be sealed yet",
                          capture->path);
     capture->writable = false;
-    sqlite3_close(capture->db);
-    capture->db = NULL;
+    capture_db_close(capture);
     /* Left by a process killed while it began a journal; SQLite ignores it, a bag must not hold it. */
     unlinkat(capture->dir_fd, CAPTURE_DB "-journal", 0);
     char *path = lumi_capture_join(capture, CAPTURE_DB);

@@ -67,19 +67,88 @@ static int bind_one(sqlite3_stmt *statement, int place, char type, va_list *args
     }
 }
 
+static int bind_all(struct lumi_capture *capture, sqlite3_stmt *statement, struct lumi_error *error, const char *types,
+                    va_list *args)
+{
+    for (int i = 0; types[i]; i++)
+        if (bind_one(statement, i + 1, types[i], args) != SQLITE_OK)
+            return capture_db_fail(capture, "bind", error);
+    return LUMI_OK;
+}
+
 static int prepare(struct lumi_capture *capture, sqlite3_stmt **statement, struct lumi_error *error, const char *sql,
                    const char *types, va_list *args)
 {
     if (sqlite3_prepare_v2(capture->db, sql, -1, statement, NULL) != SQLITE_OK)
         return capture_db_fail(capture, "prepare", error);
-    for (int i = 0; types[i]; i++)
-        if (bind_one(*statement, i + 1, types[i], args) != SQLITE_OK) {
-            int code = capture_db_fail(capture, "bind", error);
-            sqlite3_finalize(*statement);
-            *statement = NULL;
-            return code;
-        }
-    return LUMI_OK;
+    const int code = bind_all(capture, *statement, error, types, args);
+    if (code != LUMI_OK) {
+        sqlite3_finalize(*statement);
+        *statement = NULL;
+    }
+    return code;
+}
+
+/* ---- Statements that are kept ---- */
+
+/* Statements about rows; the others begin and end transactions or set something once, and must not stay. */
+static bool is_kept(const char *sql)
+{
+    return !strncmp(sql, "SELECT", 6) || !strncmp(sql, "INSERT", 6) || !strncmp(sql, "UPDATE", 6);
+}
+
+/* Its place by its address, or the next that is free; NULL: all near it are taken. */
+static struct capture_statement *place_of(struct lumi_capture *capture, const char *sql)
+{
+    const size_t first = ((uintptr_t)sql >> 3) * 2654435761u % CAPTURE_CACHE;
+
+    for (size_t i = 0; i < CAPTURE_CACHE; i++) {
+        struct capture_statement *place = &capture->cache[(first + i) % CAPTURE_CACHE];
+        if (!place->sql || place->sql == sql)
+            return place;
+    }
+    return NULL;
+}
+
+/* A bound statement, to be given to `put_back` when it has run. */
+static int take(struct lumi_capture *capture, sqlite3_stmt **statement, struct lumi_error *error, const char *sql,
+                const char *types, va_list *args)
+{
+    struct capture_statement *place = is_kept(sql) ? place_of(capture, sql) : NULL;
+
+    *statement = NULL;
+    if (!place || !place->statement)
+        return prepare(capture, statement, error, sql, types, args);
+    sqlite3_stmt *kept = place->statement;
+    place->statement = NULL;
+    const int code = bind_all(capture, kept, error, types, args);
+    if (code == LUMI_OK)
+        *statement = kept;
+    else
+        sqlite3_finalize(kept);
+    return code;
+}
+
+static void put_back(struct lumi_capture *capture, const char *sql, sqlite3_stmt *statement, int code)
+{
+    struct capture_statement *place = code == LUMI_OK && is_kept(sql) ? place_of(capture, sql) : NULL;
+
+    if (!place || place->statement || sqlite3_reset(statement) != SQLITE_OK) {
+        sqlite3_finalize(statement);
+        return;
+    }
+    sqlite3_clear_bindings(statement);
+    place->sql = sql;
+    place->statement = statement;
+}
+
+void capture_db_close(struct lumi_capture *capture)
+{
+    for (int i = 0; i < CAPTURE_CACHE; i++)
+        sqlite3_finalize(capture->cache[i].statement);
+    memset(capture->cache, 0, sizeof capture->cache);
+    sqlite3_close(capture->db);
+    capture->db = NULL;
 }
 
 int capture_db_prepare(struct lumi_capture *capture, sqlite3_stmt **statement, struct lumi_error *error,
@@ -112,11 +181,11 @@ int capture_db_run(struct lumi_capture *capture, struct lumi_error *error, const
     bool row = true;
 
     va_start(args, types);
-    int code = prepare(capture, &statement, error, sql, types, &args);
+    int code = take(capture, &statement, error, sql, types, &args);
     va_end(args);
     while (code == LUMI_OK && row)
         code = capture_db_step(capture, statement, &row, error);
-    sqlite3_finalize(statement);
+    put_back(capture, sql, statement, code);
     return code;
 }
 
@@ -128,7 +197,7 @@ int capture_db_int(struct lumi_capture *capture, int64_t *value, struct lumi_err
     bool row = false;
 
     va_start(args, types);
-    int code = prepare(capture, &statement, error, sql, types, &args);
+    int code = take(capture, &statement, error, sql, types, &args);
     va_end(args);
     if (code == LUMI_OK)
         code = capture_db_step(capture, statement, &row, error);
@@ -136,7 +205,7 @@ int capture_db_int(struct lumi_capture *capture, int64_t *value, struct lumi_err
         code = lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: no such row", capture->path);
     if (code == LUMI_OK)
         *value = sqlite3_column_int64(statement, 0);
-    sqlite3_finalize(statement);
+    put_back(capture, sql, statement, code);
     return code;
 }
 

@@ -18,6 +18,12 @@ struct capture_pending {
     char temporary[LUMI_CAPTURE_NAME]; /* its name before; "" none */
 };
 
+#define CAPTURE_CACHE 64
+struct capture_statement {
+    const char *sql; /* the very literal it was made of */
+    sqlite3_stmt *statement;
+};
+
 struct lumi_capture {
     char *path;       /* directory in use */
     char *final_path; /* where publish puts it; NULL unless staged */
@@ -25,8 +31,9 @@ struct lumi_capture {
     int dir_fd;    /* of the directory, locked by a writer; −1 for a capture in memory */
     int frames_fd; /* of data/frames; writers only */
     bool writable, sealed, in_batch;
-    int64_t db_bytes;                /* bounds what a damaged database can make a reader do */
-    struct capture_pending *pending; /* files stored in this batch */
+    int64_t db_bytes;                              /* bounds what a damaged database can make a reader do */
+    struct capture_pending *pending;               /* files stored in this batch */
+    struct capture_statement cache[CAPTURE_CACHE]; /* compiled once, for what is run for every frame */
     int pending_count, pending_capacity;
 };
 
@@ -38,11 +45,14 @@ int capture_db_fail(struct lumi_capture *capture, const char *doing, struct lumi
  * b blob (const void *, size_t). */
 int capture_db_prepare(struct lumi_capture *capture, sqlite3_stmt **statement, struct lumi_error *error,
                        const char *sql, const char *types, ...);
-/* Prepares, binds, runs a statement without rows. */
+/* Prepares, binds, runs a statement without rows. `sql`, here and below, is kept compiled by its address: a literal,
+ * not a buffer. */
 int capture_db_run(struct lumi_capture *capture, struct lumi_error *error, const char *sql, const char *types, ...);
 /* First column of the first row; LUMI_ERR_NOTFOUND without text if there is no row. */
 int capture_db_int(struct lumi_capture *capture, int64_t *value, struct lumi_error *error, const char *sql,
                    const char *types, ...);
+/* Closes the database, if it is open. */
+void capture_db_close(struct lumi_capture *capture);
 /* One step; LUMI_OK with *row telling whether there is a row. */
 int capture_db_step(struct lumi_capture *capture, sqlite3_stmt *statement, bool *row, struct lumi_error *error);
 /* Text of a column cut to size, never NULL. */
