@@ -55,6 +55,20 @@ static void arc16_is_16_cameras_at_72_positions_on_70_cm(void **state)
     sim_rig_finish(&rig);
 }
 
+static void an_arc_in_other_numbers_stands_where_it_says(void **state)
+{
+    struct sim_rig rig;
+
+    (void)state;
+    make(&rig, "arc:5x12:0.3", 1);
+    assert_int_equal(rig.count, 60);
+    assert_int_equal(rig.cameras, 5);
+    assert_true(rig.mechanism);
+    for (int i = 0; i < rig.count; i++)
+        assert_float_equal(lumi_length(rig.views[i].pose.t), 0.3, 1e-9);
+    sim_rig_finish(&rig);
+}
+
 static void bar2_is_2592_frames_on_80_cm(void **state)
 {
     struct sim_rig rig;
@@ -189,9 +203,10 @@ static void random_views_are_as_fine_as_the_pictures_and_the_second_eye_is_to_th
 
 static void what_is_no_rig_is_refused(void **state)
 {
-    static const char *const wrong[] = {"",           "arc17",         "planar:3:0.1",        "planar:0x3:0.1",
-                                        "planar:3x3", "planar:3x3:0",  "planar:3x3:0.1m",     "sphere:3x3:nan",
-                                        "sphere:",    "sphere:9x9:-1", "planar:99999x99999:1"};
+    static const char *const wrong[] = {"",           "arc17",         "planar:3:0.1",         "planar:0x3:0.1",
+                                        "planar:3x3", "planar:3x3:0",  "planar:3x3:0.1m",      "sphere:3x3:nan",
+                                        "sphere:",    "sphere:9x9:-1", "planar:99999x99999:1", "arc:17x24:1",
+                                        "arc:8x24",   "arc:8x24:0"};
     struct sim_rig_options options;
     struct sim_rig rig;
     struct lumi_error error;
@@ -212,6 +227,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(arc16_is_16_cameras_at_72_positions_on_70_cm),
+        cmocka_unit_test(an_arc_in_other_numbers_stands_where_it_says),
         cmocka_unit_test(bar2_is_2592_frames_on_80_cm),
         cmocka_unit_test(a_scale_keeps_the_parallax_between_neighbours),
         cmocka_unit_test(a_planar_grid_spans_the_plane_and_looks_along_y),
