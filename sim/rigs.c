@@ -154,7 +154,7 @@ static int find_profile(const char *name, struct lumi_rig *profile, struct lumi_
     if (cameras < 1 || cameras > LUMI_RIG_CAMERAS || positions < 1 || positions > LUMI_RIG_POSITIONS_MAX ||
         !(radius > 0 && radius < 1000))
         return lumi_fail(error, LUMI_ERR_ARG, "rig %s: cameras, positions or metres out of range", name);
-    return lumi_rig_arc(profile, cameras, positions, 1, radius, 1280, 1024, 110 * DEGREE, 88 * DEGREE, error);
+    return lumi_rig_arc(profile, cameras, positions, 1, radius, 640, 512, 110 * DEGREE, 88 * DEGREE, error);
 }
 
 static int init_mechanism(struct sim_rig *rig, const char *name, const struct sim_rig_options *o,

@@ -171,7 +171,7 @@ int rig_eyes_run(const struct rig_eyes *setup, struct lumi_error *error)
     int code;
 
     pthread_mutex_init(&eyes.lock, NULL);
-    (void)!nice(10); /* drawing is what is left of the computer: the board has its times to keep */
+    (void)!nice(3); /* drawing is what is left of the computer: the board has its times to keep */
     LUMI_GOTO(code, done, sim_place_open(setup->rig->place, &eyes.scene, error));
     eyes.gige = sim_gige_create(&source);
     if (!eyes.gige) {
