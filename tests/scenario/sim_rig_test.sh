@@ -44,7 +44,7 @@ views="--rig arc:13x34:0.18 --scale 0.25 --size 96x77"
 printf 'at shot 3 camera 0 packets lost 0.05\nat shot 4 camera 1 frames doubled for 1s\n' >faults.txt
 printf 'at shot 5 camera 2 frames dropped for 0.5s\n' >>faults.txt
 # shellcheck disable=SC2086
-"$lumi" sim rig room $views -o rig --seed 4 --position-time 1 --full-well 10000 --read-noise 4 --bits 12 \
+"$lumi" sim rig room $views -o rig --seed 4 --position-time 2 --full-well 10000 --read-noise 4 --bits 12 \
     --port 8479 --faults faults.txt --own-network -- sh "$here/sim_rig_test.sh" "$lumi" "$lumid" operate ||
     fail "the rig ended badly"
 capture=$(echo rig/captures/*.capture)
@@ -59,9 +59,8 @@ for name in rig true; do
     "$lumi" process "$from" -o $name.lumi >/dev/null || fail "$name: processing"
     "$lumi" eval $name.lumi --truth truth/transforms.json --json >$name.json || fail "$name: eval"
 done
-cat rig.json true.json
-psnr() {
-    sed 's/.*"psnr_mean" *: *\([0-9.]*\).*/\1/; t; d' "$1" | head -1
+psnr() { # of all views
+    awk -F: '/"mean"/ { on = 1 } on && /"psnr_rgb"/ { print $2 + 0; exit }' "$1"
 }
 awk -v rig="$(psnr rig.json)" -v true="$(psnr true.json)" 'BEGIN {
     printf "rig %.2f dB, true poses %.2f dB\n", rig, true
