@@ -152,7 +152,7 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
     OK(lumi_capture_frames(capture, LUMI_FRAMES_ALL, &frames, &count, error));
     assert_int_equal(count, 3);
     assert_string_equal(frames[1].name, "f.2");
-    assert_string_equal(frames[2].name, "f.2.2");
+    assert_string_equal(frames[2].name, "f.3");
     assert_int_equal(frames[2].shot, 2);
     assert_int_equal(frames[0].state, LUMI_FRAME_RETAKEN);
     assert_int_equal(frames[0].trigger_time_us, 5);
