@@ -142,7 +142,8 @@ struct lumi_camera_ops {
     int (*disarm)(struct lumi_camera *camera, struct lumi_error *error);
     /* Fires a camera that is set to LUMI_TRIGGER_SOFTWARE. */
     int (*trigger)(struct lumi_camera *camera, struct lumi_error *error);
-    /* A new exposure time and gain, armed or not, from the next frame on that says so (brackets). May be NULL. */
+    /* A new exposure time and gain, armed or not, from the next frame on that says so (brackets); 0 leaves it as it
+     * is. May be NULL. */
     int (*expose)(struct lumi_camera *camera, double exposure_s, double gain, struct lumi_error *error);
     /* LUMI_ERR_IO: the camera is gone. */
     int (*status)(struct lumi_camera *camera, struct lumi_camera_status *status, struct lumi_error *error);

@@ -154,7 +154,7 @@ static int check(const struct libcamera_camera *camera, const struct lumi_camera
     if (more > 0)
         return lumi_fail(error, LUMI_ERR_ARG, "%s (libcamera): option %s: it has no such option", identity->serial,
                          option.name);
-    if (setting->buffers < 0 || setting->buffers > BUFFERS_MAX || setting->frame_rate < 0)
+    if (setting->buffers < 0 || setting->buffers > 256 || setting->frame_rate < 0)
         return lumi_fail(error, LUMI_ERR_ARG, "%s (libcamera): %g frames a second into %d buffers", identity->serial,
                          setting->frame_rate, setting->buffers);
     if (setting->dmabuf || setting->trigger != LUMI_TRIGGER_FREE || (setting->frame_rate > 0 && !rate) ||
@@ -309,11 +309,14 @@ static int expose(struct lumi_camera *base, double exposure_s, double gain, stru
     struct libcamera_camera *camera = (struct libcamera_camera *)base;
     struct lumi_camera_setting setting = camera->setting;
 
-    setting.exposure_s = exposure_s;
-    setting.gain = gain;
+    if (exposure_s > 0)
+        setting.exposure_s = exposure_s;
+    if (gain > 0)
+        setting.gain = gain;
     LUMI_TRY(check(camera, &setting, error));
-    camera->controls.exposure_s = exposure_s;
-    camera->controls.gain = gain;
+    camera->controls.exposure_s = setting.exposure_s;
+    camera->controls.gain = setting.gain;
+    camera->setting = setting;
     return LUMI_OK;
 }
 

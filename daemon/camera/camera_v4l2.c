@@ -13,6 +13,7 @@
 
 #define LISTED_MAX 64
 #define FORMATS_MAX 256
+#define LENT_MAX (VIDEO_MAX_FRAME - 2) /* the driver needs two to go on */
 
 int v4l2_ioctl(int fd, unsigned long request, void *argument)
 {
@@ -201,7 +202,8 @@ static int configure(struct lumi_camera *base, const struct lumi_camera_setting 
 
     LUMI_TRY(v4l2_stream_stop(camera, error));
     camera->pixel = NULL;
-    if (setting->frame_rate < 0 || setting->frame_rate > 1e6 || setting->buffers < 0 || setting->buffers > 30)
+    if (setting->frame_rate < 0 || setting->frame_rate > 1e6 || setting->buffers < 0 ||
+        setting->buffers > (setting->dmabuf ? LENT_MAX : 256))
         return lumi_fail(error, LUMI_ERR_ARG, "%s: %g frames a second into %d buffers", base->identity.address,
                          setting->frame_rate, setting->buffers);
     LUMI_TRY(v4l2_pixel_option(setting, &asked, error));
@@ -242,8 +244,9 @@ static int trigger(struct lumi_camera *base, struct lumi_error *error)
 
 static int expose(struct lumi_camera *base, double exposure_s, double gain, struct lumi_error *error)
 {
-    LUMI_TRY(v4l2_control_exposure((struct v4l2_camera *)base, exposure_s, error));
-    return v4l2_control_gain((struct v4l2_camera *)base, gain, error);
+    if (exposure_s > 0)
+        LUMI_TRY(v4l2_control_exposure((struct v4l2_camera *)base, exposure_s, error));
+    return gain > 0 ? v4l2_control_gain((struct v4l2_camera *)base, gain, error) : LUMI_OK;
 }
 
 static int status(struct lumi_camera *base, struct lumi_camera_status *filled, struct lumi_error *error)

@@ -133,6 +133,22 @@ static void check_exposure(unsigned wanted, enum lumi_frame_layout layout)
     CHECK(false, "the exposure does not become %u", wanted);
 }
 
+/* A picture that breaks off in the middle comes as it is, and is told to be damaged. */
+static void check_damaged(void)
+{
+    for (int i = 0; i < 200; i++) {
+        struct lumi_camera_frame *frame = next(LUMI_CAMERA_FRAME).frame;
+        const bool damaged = frame->damaged;
+
+        if (damaged)
+            printf("a damaged frame of %zu bytes\n", frame->size);
+        lumi_camera_frame_release(frame);
+        if (damaged)
+            return;
+    }
+    CHECK(false, "no frame is damaged");
+}
+
 int main(int count, char **argument)
 {
     struct lumi_camera_host_options options;
@@ -163,6 +179,9 @@ int main(int count, char **argument)
     asked.gain = 1;
     command(&asked);
     check_exposure(200, LUMI_LAYOUT_JPEG);
+
+    printf("host: break\n");
+    check_damaged();
 
     printf("host: unplug\n");
     notice = next(LUMI_CAMERA_GONE);

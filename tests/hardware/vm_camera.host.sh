@@ -7,5 +7,8 @@ uvc=$!
 helpers="$helpers $uvc"
 qemu="$qemu -device qemu-xhci -chardev socket,id=camera,path=$work/camera,server=on,wait=off -device usb-redir,chardev=camera"
 host_asked() {
-    [ "$1" != unplug ] || kill -USR1 $uvc
+    case $1 in
+    unplug) kill -USR1 $uvc ;;
+    break) kill -USR2 $uvc ;;
+    esac
 }
