@@ -8,10 +8,10 @@ XDG_CONFIG_HOME=$scratch/config
 export XDG_CONFIG_HOME
 server=
 trap '[ -z "$server" ] || kill $server; chmod -R u+w "$scratch"; rm -rf "$scratch"' EXIT
-start_server() { # ENDING [TOKEN]
+start_server() { # ENDING [TOKEN [CERTIFICATE]]
     [ -z "$server" ] || { kill "$server" && wait "$server"; } 2>/dev/null
     rm -f "$scratch/port"
-    "$serve" "$1" "$scratch/port" ${2+"$2"} &
+    "$serve" "$1" "$scratch/port" ${2+"$2"} ${3+"$3"} &
     server=$!
     for _ in $(seq 200); do
         [ -s "$scratch/port" ] && break
@@ -91,3 +91,19 @@ unset LUMID_ADDRESS
 mkdir -p "$scratch/config/lumisphere"
 printf '[lumid]\naddress=%s\ntoken_file=%s\n' "$address" "$scratch/token" >"$scratch/config/lumisphere/lumi.conf"
 expect 0 "idle" "$lumi" capture status
+
+# TLS: a certificate that is trusted because it is named, and only then.
+command -v openssl >/dev/null || exit 0
+openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -addext subjectAltName=DNS:localhost \
+    -keyout "$scratch/key.pem" -out "$scratch/certificate.pem" 2>/dev/null || fail "openssl made no certificate"
+cat "$scratch/certificate.pem" "$scratch/key.pem" >"$scratch/both.pem"
+rm -r "$scratch/config"
+start_server complete secret "$scratch/both.pem"
+[ -s "$scratch/port" ] || exit 0 # no TLS in GLib here (glib-networking)
+LUMID_TOKEN=secret
+export LUMID_TOKEN
+expect 0 "idle" "$lumi" capture status --lumid "https://$LUMID_ADDRESS" --ca "$scratch/certificate.pem"
+expect_line 1 "--ca names the certificate to trust" "$lumi" capture status --lumid "https://$LUMID_ADDRESS"
+expect_line 1 "no answer from lumid" "$lumi" capture status
+expect 0 "/captures/fifth" "$lumi" capture start "$plan" --name fifth --watch --lumid "https://$LUMID_ADDRESS" \
+    --ca "$scratch/certificate.pem"

@@ -1,5 +1,5 @@
 /* The API over an engine that only says what a script makes it say, for the command line's tests.
- * usage: serve_api ENDING PORT_FILE [TOKEN]   ENDING: complete, missing, red
+ * usage: serve_api ENDING PORT_FILE [TOKEN [CERTIFICATE]]   ENDING: complete, missing, red
  * Every wish is taken; a start makes preflight, a sweep of 8 shots with an incident, and the ending. */
 #include "daemon/http/api_server.h"
 #include "tests/unit/engine_double.h"
@@ -106,6 +106,7 @@ int main(int argc, char **argv)
     options.listen = "localhost:0";
     options.token = argc > 3 ? argv[3] : NULL;
     options.token_everywhere = true;
+    options.certificate = argc > 4 ? argv[4] : NULL;
     options.engine = engine_double_engine();
     options.now_ns = now_ns;
     if (lumi_http_start(&options, &http, &error) != LUMI_OK) {
