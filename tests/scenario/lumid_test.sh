@@ -146,14 +146,42 @@ await 'state     sweeping'
 # At its own pace.
 finish
 grep -q "lumid: ended" log || fail "it does not say that it has ended: $(cat log)"
-[ ! -e captures/one.capture/manifest-sha256.txt ] && [ ! -e captures/one/manifest-sha256.txt ] || fail "it is sealed already"
+[ ! -e captures/one/manifest-sha256.txt ] || fail "it is sealed already"
 start sweep.conf
 await 'state     sweeping'
 "$lumi" capture stop >/dev/null 2>said || fail "stop: $(cat said)"
 await 'state     done'
 finish
-capture=$(ls -d captures/one*)
+capture=captures/one
 "$lumi" verify "$capture" >said 2>&1 || fail "$capture: $(cat said)"
+
+# ---- a capture that arrives ----
+
+mkdir arriving taken
+printf '[capture]\nfolder = %s/taken\n[process]\ncommand = touch %s/processed-%%n\n' "$scratch" "$scratch" >arrive.conf
+cp -r "$capture" arriving/
+ingest() { # until it has said what it wants to
+    : >log
+    "$lumid" --config arrive.conf --ingest "$scratch/arriving" 2>>log &
+    daemon=$!
+    tries=0
+    until grep -q -e "$1" log; do
+        kill -0 $daemon 2>/dev/null || fail "lumid has ended: $(cat log)"
+        tries=$((tries + 1))
+        [ $tries -lt 600 ] || fail "no '$1': $(cat log)"
+        sleep 0.1
+    done
+}
+ingest "processing is done"
+finish
+[ -e processed-one ] || fail "it is not processed: $(cat log)"
+"$lumi" verify taken/one >said 2>&1 || fail "taken in: $(cat said)"
+rm processed-one
+mkdir arriving/nonsense
+echo nothing >arriving/nonsense/file
+ingest "nonsense: not taken in"
+finish
+[ ! -e processed-one ] || fail "it is processed again"
 
 # ---- a capture of a newer lumid ----
 

@@ -1,4 +1,5 @@
 lumi_test(test_lumid_config FOLDERS lumid base)
+lumi_test(test_lumid_tasks FOLDERS lumid base LABELS threads)
 
 # libgpiod on a kernel that is the test's own; without umockdev this test is left out.
 pkg_check_modules(UMOCKDEV IMPORTED_TARGET umockdev-1.0)
