@@ -207,6 +207,9 @@ static void write_verdict(struct lumi_engine *e, const struct engine_judging *jo
     struct engine_flight *flight = engine_flight(e, LUMI_STORE_JUDGED);
 
     frame->dead_row = !accepted;
+    if (!accepted)
+        engine_incident(e, job->camera, "rejected", "shot %d of %s: %s", job->shot, e->config.cameras[job->camera].name,
+                        reason);
     engine_frame_go(e, job->shot, job->camera, accepted ? AT_ACCEPTED : AT_REJECTED, reason);
     if (!flight)
         return;

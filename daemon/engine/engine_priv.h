@@ -82,6 +82,13 @@ struct engine_shot {
     int64_t expected_ns; /* host: begin of the exposures as told last; LUMI_NO_TIME */
 };
 
+/* A frame that came of a test shot. */
+struct engine_test_answer {
+    int64_t fired_ns;
+    struct lumi_match_frame frame;
+};
+#define ENGINE_ANSWERS 8
+
 /* A frame in memory: who needs it. */
 struct engine_held {
     struct lumi_camera_frame *frame;
@@ -137,6 +144,9 @@ struct engine_camera {
     int file_count, file_room;
     int64_t file_ns; /* when the last came */
     uint32_t seen;   /* bit a camera that answered its trigger in the test */
+    bool round_seen; /* it answered the test shot that was fired last */
+    struct engine_test_answer answers[ENGINE_ANSWERS];
+    int answer_count;
     bool trusted;    /* where its clock or count stands is known */
     uint32_t misses; /* frames that never came, and frames of no shot, since */
     bool edge_seen;  /* of its sync line, in the test */
@@ -252,7 +262,9 @@ struct lumi_engine {
     bool check_hard[LUMI_ENGINE_CHECKS];
     int check_count;
     int test_camera;
-    int64_t test_ns;
+    int64_t test_ns; /* when the test shot was fired; 0: none was */
+    bool test_told;  /* the board has said so */
+    int test_rounds;
     struct engine_camera cameras[LUMI_RIG_CAMERAS];
 };
 
