@@ -230,6 +230,9 @@ void engine_match_all(struct lumi_engine *e)
     struct lumi_match_result result;
 
     for (int c = 0; c < e->config.camera_count; c++)
+        if (e->cameras[c].match && !e->connected)
+            lumi_match_deaf(e->cameras[c].match, e->now);
+    for (int c = 0; c < e->config.camera_count; c++)
         if (e->frames && e->cameras[c].used && e->cameras[c].match)
             while (lumi_match_next(e->cameras[c].match, e->now, &result))
                 take_result(e, c, &result);

@@ -60,6 +60,11 @@ void lumi_match_restart(struct lumi_match *match)
     match->sequence_known = false;
 }
 
+void lumi_match_deaf(struct lumi_match *match, int64_t now_ns)
+{
+    match->deaf_ns = now_ns;
+}
+
 bool lumi_match_expect(struct lumi_match *match, int64_t at_ns, double exposure_s, int shot)
 {
     int place = match->exposure_count;
@@ -195,11 +200,20 @@ static int by_sequence(const struct lumi_match *match, const struct lumi_match_f
     return at >= 0 && at < match->exposure_count && could_be(match, (int)at, frame) ? (int)at : -1;
 }
 
+/* It says that its exposure is one that is not known yet. */
+static bool counts_beyond(const struct lumi_match *match, const struct lumi_match_frame *frame)
+{
+    return match->sequence_known && frame->sequence > match->last_sequence &&
+           match->last + (int64_t)(frame->sequence - match->last_sequence) >= match->exposure_count;
+}
+
 enum decision { WAIT = -1, NONE = -2, TWICE = -3 }; /* otherwise the exposure */
 
 static bool overdue(const struct lumi_match *match, const struct lumi_match_frame *frame, int64_t now, double seconds)
 {
-    return match->finished || (double)(now - frame->host_ns) * 1e-9 >= seconds;
+    const int64_t since = frame->host_ns > match->deaf_ns ? frame->host_ns : match->deaf_ns;
+
+    return match->finished || (double)(now - since) * 1e-9 >= seconds;
 }
 
 /* A later frame in the list that came so soon after this one that both had been waiting somewhere: +1; none yet: 0; one
@@ -252,7 +266,8 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
         return WAIT;
     if (counted >= 0)
         return counted;
-    int last = only(match, frame); /* a frame of a wrong shot is worse than one that has to be taken again */
+    /* A frame of a wrong shot is worse than one that has to be taken again. */
+    int last = counts_beyond(match, frame) ? -1 : only(match, frame);
     return last >= 0 ? last : overdue(match, frame, now, match->options.patience) ? NONE : WAIT;
 }
 

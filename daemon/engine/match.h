@@ -88,6 +88,9 @@ void lumi_match_restart(struct lumi_match *match);
 bool lumi_match_expect(struct lumi_match *match, int64_t at_ns, double exposure_s, int shot);
 void lumi_match_edge(struct lumi_match *match, int64_t at_ns);
 void lumi_match_frame(struct lumi_match *match, const struct lumi_match_frame *frame);
+/* Until now nobody could tell of exposures (the board is away): frames wait for them from now on, not from when they
+ * came. */
+void lumi_match_deaf(struct lumi_match *match, int64_t now_ns);
 /* The next verdict; false: none now. */
 bool lumi_match_next(struct lumi_match *match, int64_t now_ns, struct lumi_match_result *result);
 /* When time alone will bring one; INT64_MAX: never. */

@@ -35,6 +35,7 @@ struct lumi_match {
     struct lumi_match_frame frames[MATCH_WAITING]; /* as they arrived */
     int frame_count;
     bool overflow, finished;
+    int64_t deaf_ns; /* until when nobody could tell of exposures */
     int64_t edges[MATCH_EDGES];
     int edge_count;
     /* The camera's clock: host = host_at + (device − device_at) · (1 + drift). */
