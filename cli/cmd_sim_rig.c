@@ -14,7 +14,7 @@
 #include <string.h>
 
 static char *profile, *rig_text = "arc16", *size_text, *faults_path, *folder, *layout = "raw", *process;
-static double scale = 1, speed = 1, full_well, read_noise, exposure = 0.004, position_time = 2;
+static double scale = 1, speed = 1, full_well, read_noise, exposure = 0.004, position_time = 2, patience = 120;
 static int seed = 1, processes, first_host = 2, bits, port = 8470;
 static gboolean own_network;
 static volatile sig_atomic_t stop;
@@ -41,6 +41,8 @@ static const GOptionEntry options[] = {
      "S"},
     {"position-time", 0, 0, G_OPTION_ARG_DOUBLE, &position_time, "of the plan, seconds from position to position (2)",
      "S"},
+    {"patience", 0, 0, G_OPTION_ARG_DOUBLE, &patience,
+     "in lumid.conf: seconds a frame may take, which is as long as the drawing takes here (120)", "S"},
     {"layout", 0, 0, G_OPTION_ARG_STRING, &layout, "of the frames in lumid.conf: raw (default), rgb or jpeg", "LAYOUT"},
     {"bits", 0, 0, G_OPTION_ARG_INT, &bits, "of raw frames in lumid.conf: 8, 10, 12 or 16 (the most)", "BITS"},
     {"port", 0, 0, G_OPTION_ARG_INT, &port, "of the API in lumid.conf (8470)", "PORT"},
@@ -124,6 +126,8 @@ static int check(struct lumi_error *error)
         return lumi_fail(error, LUMI_ERR_ARG, "--exposure: 0.00001 to 10");
     if (!(position_time > 0 && position_time <= 3600))
         return lumi_fail(error, LUMI_ERR_ARG, "--position-time: more than 0, at most 3600");
+    if (!(patience >= 0.1 && patience <= 3600))
+        return lumi_fail(error, LUMI_ERR_ARG, "--patience: 0.1 to 3600");
     if (port < 0 || port > 65535)
         return lumi_fail(error, LUMI_ERR_ARG, "--port: 0 to 65535");
     if (bits != 0 && bits != 8 && bits != 10 && bits != 12 && bits != 16)
@@ -156,6 +160,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     rig.position_time = position_time;
     g_strlcpy(rig.layout, layout, sizeof rig.layout);
     rig.bits = bits;
+    rig.patience = patience;
     rig.port = port;
     rig.process = process;
     rig.stop = &stop;

@@ -65,10 +65,10 @@ static int write_configuration(const struct sim_rig_processes *rig, struct lumi_
     /* Drawing is slower than a camera, and several share a processor: a frame may be late. Small pictures of plain
      * walls say little about sharpness and exposure. */
     g_string_append_printf(text,
-                           "\n[rig]\nlink = serial:%s/board\n\n[capture]\nfolder = %s\nframe_patience_s = 600\n"
+                           "\n[rig]\nlink = serial:%s/board\n\n[capture]\nfolder = %s\nframe_patience_s = %g\n"
                            "memory = 256M\n\n[judge]\nclipped = 0.9\nsharpness_share = 0\nexposure_stops = "
                            "20\nblur_pixels = 1000\n\n[http]\nlisten = localhost:%d\n",
-                           rig->folder, captures, rig->port);
+                           rig->folder, captures, rig->patience, rig->port);
     if (rig->process)
         g_string_append_printf(text, "\n[process]\ncommand = %s\n", rig->process);
     for (int i = 0; i < rig->rig.camera_count; i++)

@@ -45,6 +45,7 @@ void sim_rig_processes_init(struct sim_rig_processes *rig)
     rig->reference = rig->exposure = 0.004;
     rig->position_time = 2;
     snprintf(rig->layout, sizeof rig->layout, "raw");
+    rig->patience = 120;
     rig->port = 8470;
 }
 

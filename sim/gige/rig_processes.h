@@ -25,6 +25,7 @@ struct sim_rig_processes {
     double position_time, exposure; /* of the plan: start-stop */
     char layout[16];                /* of lumid's frames: "raw", "jpeg", "rgb" */
     int bits;
+    double patience;     /* s, until a frame that does not come is taken again: drawing may be slow */
     int port;            /* of lumid's API */
     const char *process; /* command after a capture, or NULL */
     const volatile sig_atomic_t *stop;
