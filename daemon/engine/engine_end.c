@@ -131,6 +131,10 @@ bool engine_stage_drain(struct lumi_engine *e)
         give_up_stranded(e);
         if (!drained(e))
             return false;
+        for (int c = 0; c < e->config.camera_count; c++) /* edges that are missing are told of, strays let go */
+            if (e->cameras[c].used && e->cameras[c].match)
+                lumi_match_finish(e->cameras[c].match);
+        engine_match_all(e);
         e->stage_at = 2;
         needed = engine_frames_needed(e);
         if (needed > 0 && e->retakes_left > 0 && !e->want_stop) {

@@ -226,6 +226,26 @@ static int bunched(const struct lumi_match *match, int place)
     return apart < 0.6 * match->options.spacing ? 1 : -1;
 }
 
+/* By its count it is of an exposure that was given up: it was held up for longer than anybody waits. */
+static bool counts_given_up(const struct lumi_match *match, const struct lumi_match_frame *frame, int timed)
+{
+    if (!match->sequence_known || frame->sequence <= match->last_sequence)
+        return false;
+    int64_t at = match->last + (int64_t)(frame->sequence - match->last_sequence);
+    return at >= 0 && at < timed && match->exposures[at].matched;
+}
+
+/* Where no count helps, frames that come at once say that they were held up: when they came says nothing. */
+static int alone(const struct lumi_match *match, int place, int64_t now)
+{
+    const struct lumi_match_frame *frame = match->frames + place;
+    const double apart = 0.6 * match->options.spacing;
+
+    if (bunched(match, place) > 0 || (double)(frame->host_ns - match->decided_ns) * 1e-9 < apart)
+        return NONE;
+    return bunched(match, place) < 0 || overdue(match, frame, now, apart) ? 0 : WAIT;
+}
+
 /* Without the camera's clock: by arrival and by the camera's count. */
 static int by_arrival(const struct lumi_match *match, int place, int64_t now)
 {
@@ -253,7 +273,13 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
         return frame->sequence > match->exposures[timed].sequence && latest(match, frame) > timed ? latest(match, frame)
                                                                                                   : TWICE;
     }
-    if (timed >= 0 && (counted < 0 || counted == timed) && could_be(match, timed, frame))
+    if (timed >= 0 && counts_given_up(match, frame, timed))
+        return NONE;
+    if (timed >= 0 && counted < 0 && could_be(match, timed, frame)) {
+        int others = match->sequence_known || match->options.device_clock ? 0 : alone(match, place, now);
+        return others == 0 ? timed : others;
+    }
+    if (timed >= 0 && counted == timed)
         return timed;
     if (timed >= 0 && counted >= 0 && counted < timed) {
         /* Late by a whole exposure, or the camera missed a trigger: the next frame tells. */
@@ -357,9 +383,12 @@ static bool next_frame(struct lumi_match *match, int64_t now, struct lumi_match_
         int at = decide(match, place, now);
         if (at == WAIT && !match->finished)
             continue;
+        match->decided_ns = frame.host_ns;
         if (at >= 0) {
             hit(match, at, &frame, result);
         } else {
+            if (at == NONE && !match->options.device_clock)
+                match->sequence_known = false; /* its count leads nowhere */
             *result = (struct lumi_match_result){
                 .kind = at == TWICE ? LUMI_MATCH_DOUBLED : LUMI_MATCH_SURPLUS, .shot = -1, .frame = frame.tag};
             result->gap = frame.gap;

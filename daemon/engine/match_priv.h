@@ -35,7 +35,8 @@ struct lumi_match {
     struct lumi_match_frame frames[MATCH_WAITING]; /* as they arrived */
     int frame_count;
     bool overflow, finished;
-    int64_t deaf_ns; /* until when nobody could tell of exposures */
+    int64_t decided_ns; /* when the frame arrived that was decided last */
+    int64_t deaf_ns;    /* until when nobody could tell of exposures */
     int64_t edges[MATCH_EDGES];
     int edge_count;
     /* The camera's clock: host = host_at + (device − device_at) · (1 + drift). */
