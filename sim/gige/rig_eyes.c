@@ -15,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#define LOOKS 12     /* small pictures of each camera before it begins */
 #define BLUR_STEPS 9 /* poses that an exposure is made of, at most: one a pixel of smear */
 #define THREADS 1    /* a picture: there is a process for every processor */
 
@@ -93,6 +94,31 @@ static int picture(void *context, int index, const struct sim_gige_exposure *exp
         }
     }
     return code;
+}
+
+/* The place's indirect light is computed where somebody first looks: small pictures all around, before anybody waits
+ * for a large one. */
+static int look_around(const struct eyes *e, struct lumi_error *error)
+{
+    const struct lumi_rig *rig = &e->setup->rig->rig;
+
+    for (int i = 0; i < e->setup->count * LOOKS; i++) {
+        const int camera = e->setup->first + i / LOOKS;
+        struct lumi_lens lens = rig->lenses[rig->cameras[camera].lens].lens;
+        struct lumi_raster small = {0};
+        struct lumi_pose pose;
+
+        lens.width = (lens.width + 3) / 4;
+        lens.height = (lens.height + 3) / 4;
+        lens.fx /= 4;
+        lens.fy /= 4;
+        lens.cx /= 4;
+        lens.cy /= 4;
+        lumi_rig_camera_pose_at(rig, camera, 2 * LUMI_PI * (i % LOOKS) / LOOKS, 0, &pose);
+        LUMI_TRY(sim_camera_render(e->scene, &lens, &pose, THREADS, &small, NULL, error));
+        lumi_raster_finish(&small);
+    }
+    return LUMI_OK;
 }
 
 static void tell(struct eyes *e, const struct rig_message *message)
@@ -179,6 +205,7 @@ int rig_eyes_run(const struct rig_eyes *setup, struct lumi_error *error)
         goto done;
     }
     LUMI_GOTO(code, done, add_cameras(&eyes, error));
+    LUMI_GOTO(code, done, look_around(&eyes, error));
     LUMI_GOTO(code, done, sim_gige_start(eyes.gige, 1, error));
     rig_report(setup->report, LUMI_OK, NULL);
     listen_to_board(&eyes);

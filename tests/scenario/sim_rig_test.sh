@@ -45,8 +45,8 @@ views="--rig arc:13x34:0.18 --scale 0.25 --size 96x77"
 # One camera loses packets, one sends frames twice: the capture is complete all the same.
 printf 'at shot 3 camera 0 packets lost 0.05\nat shot 4 camera 1 frames doubled for 3s\n' >faults.txt
 # shellcheck disable=SC2086
-"$lumi" sim rig room $views -o rig --seed 4 --position-time 2 --full-well 10000 --read-noise 4 --bits 12 \
-    --patience 600 --port 8479 --faults faults.txt --own-network -- sh "$here/sim_rig_test.sh" "$lumi" "$lumid" operate ||
+"$lumi" sim rig room $views -o rig --seed 4 --position-time 4 --full-well 10000 --read-noise 4 --bits 12 \
+    --patience 60 --port 8479 --faults faults.txt --own-network -- sh "$here/sim_rig_test.sh" "$lumi" "$lumid" operate ||
     fail "the rig ended badly"
 capture=$(echo rig/captures/*.capture)
 "$lumi" verify "$capture" || fail "the capture is not whole"
