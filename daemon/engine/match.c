@@ -276,7 +276,7 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
     if (timed >= 0 && counts_given_up(match, frame, timed))
         return NONE;
     if (timed >= 0 && counted < 0 && could_be(match, timed, frame)) {
-        int others = match->sequence_known || match->options.device_clock ? 0 : alone(match, place, now);
+        int others = match->sequence_known ? 0 : alone(match, place, now);
         return others == 0 ? timed : others;
     }
     if (timed >= 0 && counted == timed)
