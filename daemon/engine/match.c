@@ -10,6 +10,7 @@
 #define CLOCK_SLACK 0.02  /* s, a fitted clock may be wrong by: jitter of drivers that take the time late */
 #define PRIOR_SLACK 0.15  /* before any frame of a sweep was matched */
 #define FIRST_LATENCY 0.5 /* s, of a camera of which nothing is known */
+#define STRAYS 2          /* frames of no exposure one after another, while exposures want one: the clock is wrong */
 #define LATE_LEAST 0.25   /* s over the usual delay until a frame is called late */
 
 void lumi_match_options_init(struct lumi_match_options *options)
@@ -139,7 +140,7 @@ static double clock_slack(const struct lumi_match *match, int64_t device_ns)
 }
 
 /* Index of the exposure nearest to `at` within `best` seconds, or −1; `open`: only those without a frame. */
-static int nearest_within(const struct lumi_match *match, int64_t at, double best, bool open)
+int match_nearest_within(const struct lumi_match *match, int64_t at, double best, bool open)
 {
     int found = -1;
 
@@ -155,10 +156,10 @@ static int nearest_within(const struct lumi_match *match, int64_t at, double bes
 
 int match_nearest(const struct lumi_match *match, int64_t at, bool open)
 {
-    return nearest_within(match, at, match_half(match), open);
+    return match_nearest_within(match, at, match_half(match), open);
 }
 
-static bool could_be(const struct lumi_match *match, int i, const struct lumi_match_frame *frame)
+bool match_could_be(const struct lumi_match *match, int i, const struct lumi_match_frame *frame)
 {
     const struct match_exposure *e = match->exposures + i;
     double latency = (double)(frame->host_ns - e->at) * 1e-9;
@@ -172,7 +173,7 @@ static int only(const struct lumi_match *match, const struct lumi_match_frame *f
     int found = -1;
 
     for (int i = 0; i < match->exposure_count; i++)
-        if (could_be(match, i, frame)) {
+        if (match_could_be(match, i, frame)) {
             if (found >= 0)
                 return -1;
             found = i;
@@ -185,7 +186,7 @@ static int only(const struct lumi_match *match, const struct lumi_match_frame *f
 static int latest(const struct lumi_match *match, const struct lumi_match_frame *frame)
 {
     for (int i = match->exposure_count - 1; i >= 0; i--)
-        if (could_be(match, i, frame))
+        if (match_could_be(match, i, frame))
             return i;
     return -1;
 }
@@ -197,7 +198,7 @@ static int by_sequence(const struct lumi_match *match, const struct lumi_match_f
         frame->sequence - match->last_sequence > MATCH_EXPOSURES)
         return -1;
     int64_t at = match->last + (int64_t)(frame->sequence - match->last_sequence);
-    return at >= 0 && at < match->exposure_count && could_be(match, (int)at, frame) ? (int)at : -1;
+    return at >= 0 && at < match->exposure_count && match_could_be(match, (int)at, frame) ? (int)at : -1;
 }
 
 /* It says that its exposure is one that is not known yet. */
@@ -275,7 +276,7 @@ static int by_arrival(const struct lumi_match *match, int place, int64_t now)
     }
     if (timed >= 0 && counts_given_up(match, frame, timed))
         return NONE;
-    if (timed >= 0 && counted < 0 && could_be(match, timed, frame)) {
+    if (timed >= 0 && counted < 0 && match_could_be(match, timed, frame)) {
         int others = match->sequence_known ? 0 : alone(match, place, now);
         return others == 0 ? timed : others;
     }
@@ -313,6 +314,17 @@ static bool known_beyond(const struct lumi_match *match, int64_t at)
            (double)(match->exposures[match->exposure_count - 1].at - at) * 1e-9 > match_half(match);
 }
 
+/* Nothing is known of the camera's clock: the frames that come next tell which exposure this one is of. */
+static int cold(const struct lumi_match *match, int place, int64_t now)
+{
+    const struct lumi_match_frame *frame = match->frames + place;
+
+    if (place > 0 || !overdue(match, frame, now, match_cold_wait(match))) /* the first brings the clock */
+        return WAIT;
+    int first = match_cold(match, place, now);
+    return first >= 0 ? first : overdue(match, frame, now, match->options.patience) ? NONE : WAIT;
+}
+
 static int decide(struct lumi_match *match, int place, int64_t now)
 {
     const struct lumi_match_frame *frame = match->frames + place;
@@ -321,14 +333,18 @@ static int decide(struct lumi_match *match, int place, int64_t now)
         return NONE;
     if (match->period > 0)
         return free_running(match, frame, now);
-    if (!match->options.device_clock || frame->device_ns == LUMI_MATCH_NO_TIME || !match->clock_known)
+    if (!match->options.device_clock || frame->device_ns == LUMI_MATCH_NO_TIME)
         return by_arrival(match, place, now);
+    if (match->clock_known && match_from_future(match, frame))
+        match_forget(match);
+    if (!match->clock_known)
+        return cold(match, place, now);
     int64_t at = match_to_host(match, frame->device_ns);
-    int near = nearest_within(match, at, clock_slack(match, frame->device_ns), false);
+    int near = match_nearest_within(match, at, clock_slack(match, frame->device_ns), false);
     if (near >= 0)
         return match->exposures[near].matched ? TWICE : near;
     if (match_clock_stepped(match, place, now))
-        return by_arrival(match, place, now);
+        return cold(match, place, now);
     /* Exposures on both sides are known and it is of none; or nothing more will be known of that time. */
     if (known_beyond(match, at) && overdue(match, frame, now, match->options.settle) &&
         overdue(match, frame, now, 2.5 * match->options.spacing + match->options.settle))
@@ -355,6 +371,7 @@ static void hit(struct lumi_match *match, int i, const struct lumi_match_frame *
     else
         result->residual = match_clock_add(match, frame, e->at);
     match_latency_add(match, result->latency);
+    match->strays = 0;
     e->matched = true;
     e->sequence = frame->sequence;
     e->frame_ns = frame->device_ns;
@@ -398,6 +415,8 @@ static bool next_frame(struct lumi_match *match, int64_t now, struct lumi_match_
                 match->counts.doubled++;
             } else {
                 match->counts.surplus += match->period <= 0;
+                if (latest(match, &frame) >= 0 && ++match->strays >= STRAYS)
+                    match_forget(match);
             }
         }
         take_out(match, place);

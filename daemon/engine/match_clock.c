@@ -6,6 +6,7 @@
 
 #define DRIFT_SPAN 4.0  /* s of pairs before a drift is believed */
 #define DRIFT_MOST 2e-3 /* no camera's crystal is worse; what says so is noise */
+#define TOLERANCE 0.01  /* s, between the intervals of two clocks */
 #define LATENCY_NEW 0.1 /* share of a new delay in the usual one */
 
 int64_t match_to_host(const struct lumi_match *match, int64_t device_ns)
@@ -20,6 +21,72 @@ int64_t match_when(const struct lumi_match *match, const struct lumi_match_frame
     if (match->options.device_clock && match->clock_known && frame->device_ns != LUMI_MATCH_NO_TIME)
         return match_to_host(match, frame->device_ns);
     return frame->host_ns - (int64_t)(match->latency * 1e9);
+}
+
+bool match_from_future(const struct lumi_match *match, const struct lumi_match_frame *frame)
+{
+    double ahead = (double)(match_to_host(match, frame->device_ns) - frame->host_ns) * 1e-9;
+
+    return ahead > match->options.early + (match->pair_count ? 2 * TOLERANCE : match_half(match));
+}
+
+void match_forget(struct lumi_match *match)
+{
+    match->clock_known = false;
+    match->pair_count = match->pair_next = 0;
+    match->residual_sum = 0;
+    match->residual_count = 0;
+    match->drift = 0;
+    match->strays = 0;
+}
+
+double match_cold_wait(const struct lumi_match *match)
+{
+    double gap = match->options.spacing;
+    const int n = match->exposure_count;
+
+    for (int i = n > 4 ? n - 4 : 1; i < n; i++)
+        gap = fmax(gap, (double)(match->exposures[i].at - match->exposures[i - 1].at) * 1e-9);
+    return fmin(1.6 * gap + match->options.settle, match->options.patience / 2);
+}
+
+/* How many of the other frames would be of no exposure if this one were of exposure i; −1: one had come too early. */
+static int misfits(const struct lumi_match *match, int place, int i, int64_t now)
+{
+    const int64_t offset = match->exposures[i].at - match->frames[place].device_ns;
+    const int64_t last = match->exposures[match->exposure_count - 1].at;
+    const double tolerance = fmin(match_half(match), 2 * TOLERANCE);
+    int misfits = 0;
+
+    for (int k = 0; k < match->frame_count; k++) {
+        const struct lumi_match_frame *other = match->frames + k;
+        if (k == place || other->device_ns == LUMI_MATCH_NO_TIME)
+            continue;
+        int64_t at = other->device_ns + offset;
+        if ((double)(at - other->host_ns) * 1e-9 > match->options.early)
+            return -1;
+        /* What was exposed just now nobody may have told of yet. */
+        const int64_t told = at > match->deaf_ns ? at : match->deaf_ns;
+        if ((double)(at - last) * 1e-9 <= tolerance || (double)(now - told) * 1e-9 > match->options.settle)
+            misfits += match_nearest_within(match, at, tolerance, false) < 0;
+    }
+    return misfits;
+}
+
+int match_cold(const struct lumi_match *match, int place, int64_t now)
+{
+    int best = -1, fewest = INT32_MAX;
+
+    for (int i = 0; i < match->exposure_count; i++) {
+        if (!match_could_be(match, i, match->frames + place))
+            continue;
+        int here = misfits(match, place, i, now);
+        if (here >= 0 && here <= fewest) {
+            fewest = here;
+            best = i;
+        }
+    }
+    return best;
 }
 
 /* About the newest pair, so that nothing large is squared. */
@@ -112,9 +179,7 @@ bool match_clock_stepped(struct lumi_match *match, int place, int64_t now)
         double device_apart = (double)(other->device_ns - frame->device_ns) * 1e-9;
         if (fabs(host_apart - device_apart) > half / 2)
             continue;
-        match->clock_known = false;
-        match->pair_count = match->pair_next = 0;
-        match->drift = 0;
+        match_forget(match);
         return true;
     }
     return false;

@@ -35,6 +35,7 @@ struct lumi_match {
     struct lumi_match_frame frames[MATCH_WAITING]; /* as they arrived */
     int frame_count;
     bool overflow, finished;
+    int strays;         /* frames of no exposure since the last that had one */
     int64_t decided_ns; /* when the frame arrived that was decided last */
     int64_t deaf_ns;    /* until when nobody could tell of exposures */
     int64_t edges[MATCH_EDGES];
@@ -55,11 +56,21 @@ struct lumi_match {
 
 double match_half(const struct lumi_match *match);
 int match_nearest(const struct lumi_match *match, int64_t at, bool open);
+int match_nearest_within(const struct lumi_match *match, int64_t at, double best, bool open);
+/* By its arrival: not before the exposure's end, not beyond patience. */
+bool match_could_be(const struct lumi_match *match, int i, const struct lumi_match_frame *frame);
 bool match_prune(struct lumi_match *match, int64_t now);
 
 /* match_clock.c */
 int64_t match_to_host(const struct lumi_match *match, int64_t device_ns);
 int64_t match_when(const struct lumi_match *match, const struct lumi_match_frame *frame); /* as well as is known */
+/* The clock says that it was taken after it had arrived. */
+bool match_from_future(const struct lumi_match *match, const struct lumi_match_frame *frame);
+void match_forget(struct lumi_match *match);
+/* Without a clock: how long a frame waits for others, and then the exposure that fits it and them best: none of them
+ * may arrive before it was taken, and the fewest may be of no exposure; of several the latest, for delays are short. */
+double match_cold_wait(const struct lumi_match *match);
+int match_cold(const struct lumi_match *match, int place, int64_t now);
 /* Adds a pair; returns by how many seconds the line missed it before (0: there was none, or no clock). */
 double match_clock_add(struct lumi_match *match, const struct lumi_match_frame *frame, int64_t host_ns);
 void match_latency_add(struct lumi_match *match, double latency);

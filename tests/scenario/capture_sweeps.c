@@ -214,7 +214,7 @@ static void what_is_wrong_with_a_frame_is_found_and_named(void **state)
             fail_msg("%s: %d frames were retaken", name, d->account.retaken);
         for (int k = 0; k < d->incident_count && d->o.w.trace; k++)
             print_message("  %s: %s\n", d->incidents[k].kind, d->incidents[k].text);
-        if (!named(d, faults[i].word))
+        if (faults[i].word[0] && !named(d, faults[i].word))
             fail_msg("%s: no incident names it", name);
         day_destroy(d);
     }
