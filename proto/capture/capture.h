@@ -225,7 +225,8 @@ struct lumi_capture_judgement {
 int lumi_capture_set_judgement(struct lumi_capture *capture, int64_t frame,
                                const struct lumi_capture_judgement *judgement, struct lumi_error *error);
 /* rejected → retaken; a new planned frame of the same camera, position and place, named "<name>.<n>", takes over. It
- * joins the other retakes of its shot in a new shot that has not been fired yet. */
+ * joins the other retakes of its shot in a new shot that has not been fired yet, and has the prior pose of the first.
+ */
 int lumi_capture_retake_frame(struct lumi_capture *capture, int64_t frame, int64_t *id, struct lumi_error *error);
 
 /* A pose becomes the frame's current one; earlier ones are kept. `origin`: where it came from ("lumi sim shoot room

@@ -393,6 +393,12 @@ static int insert_retake(struct lumi_capture *capture, int64_t frame, const char
     again.name = name;
     again.shot = shot;
     LUMI_TRY(insert_frame(capture, &again, frame, id, error));
+    LUMI_TRY(
+        capture_db_run(capture, error,
+                       "INSERT INTO poses(frame, source, origin, current, r00, r01, r02, r10, r11, r12, r20, r21, "
+                       "r22, tx, ty, tz) SELECT ?, source, origin, 1, r00, r01, r02, r10, r11, r12, r20, r21, r22, "
+                       "tx, ty, tz FROM poses WHERE frame = ? AND source = 'prior' ORDER BY id DESC LIMIT 1",
+                       "ii", *id, frame));
     return capture_db_run(capture, error, "UPDATE frames SET state = 'retaken' WHERE id = ?", "i", frame);
 }
 

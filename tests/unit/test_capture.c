@@ -131,6 +131,8 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
 
     OK(lumi_capture_create_live(in_scratch(state, "a"), &capture, error));
     int64_t camera = add_camera(capture, "c"), id = add_frame(capture, camera, "f");
+    const struct lumi_pose pose = {.t = {1, 2, 3}, .r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    OK(lumi_capture_set_pose(capture, id, &pose, LUMI_POSE_PRIOR, "plan", error));
     FAILS(lumi_capture_judge_frame(capture, id, true, 1, NULL, error), LUMI_ERR_ARG, "'f' is planned");
     FAILS(lumi_capture_retake_frame(capture, id, &again, error), LUMI_ERR_ARG, "cannot become retaken");
     OK(lumi_capture_trigger_frame(capture, id, 5, error));
@@ -157,6 +159,8 @@ static void a_frame_moves_through_its_states_and_no_other_way(void **state)
     assert_int_equal(frames[0].state, LUMI_FRAME_RETAKEN);
     assert_int_equal(frames[0].trigger_time_us, 5);
     assert_int_equal(frames[2].retake_of, again);
+    assert_true(frames[2].has_pose && frames[2].pose_source == LUMI_POSE_PRIOR); /* it is taken from the same place */
+    assert_true(frames[2].pose.t.y == 2);
     lumi_free(frames);
     lumi_capture_close(capture);
 }
