@@ -188,6 +188,7 @@ void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, in
     struct lumi_engine_told told = {.kind = kind,
                                     .number = ++e->told_number,
                                     .unix_us = engine_unix_us(e, e->now),
+                                    .state = e->state,
                                     .shot = shot,
                                     .camera = camera,
                                     .check = kind == LUMI_TALE_CHECK ? shot : -1};

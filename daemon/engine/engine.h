@@ -67,8 +67,27 @@ struct lumi_engine_judge_job {
     struct lumi_judge_neighbour neighbours[4];
     int neighbour_count;
 };
+
+enum lumi_engine_state {
+    LUMI_ENGINE_IDLE = 0,
+    LUMI_ENGINE_PREFLIGHT,
+    LUMI_ENGINE_RED, /* the preflight failed: nothing was started */
+    LUMI_ENGINE_HOMING,
+    LUMI_ENGINE_ARMING,
+    LUMI_ENGINE_SWEEPING,
+    LUMI_ENGINE_PAUSING,
+    LUMI_ENGINE_PAUSED,      /* by the operator, or because the disk is slow (it goes on by itself then) */
+    LUMI_ENGINE_INTERRUPTED, /* fault, board away, e-stop, crash: `text` says what has to be done */
+    LUMI_ENGINE_DRAINING,    /* the sweep is over; frames are still coming */
+    LUMI_ENGINE_SEALING,
+    LUMI_ENGINE_DONE, /* sealed: complete, or with frames that stay missing */
+    LUMI_ENGINE_FAILED
+};
+#define LUMI_ENGINE_STATES 13
+const char *lumi_engine_state_name(enum lumi_engine_state state);
+
 enum lumi_engine_tale {
-    LUMI_TALE_STATE = 0, /* status.state changed; `text` why */
+    LUMI_TALE_STATE = 0, /* status.state or its text changed: `state`, `text` */
     LUMI_TALE_CHECK,     /* of the preflight: `check` */
     LUMI_TALE_SHOT,      /* `shot`; `lost` */
     LUMI_TALE_FRAME,     /* `shot`, `camera`, `frame_state`; `text` the reason, if any */
@@ -80,6 +99,7 @@ struct lumi_engine_told {
     enum lumi_engine_tale kind;
     uint64_t number; /* 1, 2, 3 … of this engine */
     int64_t unix_us;
+    enum lumi_engine_state state; /* at that moment, whatever the tale is about */
     int shot, camera, check;
     bool lost;
     enum lumi_frame_state frame_state;
@@ -167,24 +187,6 @@ int lumi_engine_clear(struct lumi_engine *engine, int64_t now_ns, struct lumi_er
 int lumi_engine_recover(struct lumi_engine *engine, int64_t now_ns, bool *found, struct lumi_error *error);
 
 /* ---- what can be seen ---- */
-
-enum lumi_engine_state {
-    LUMI_ENGINE_IDLE = 0,
-    LUMI_ENGINE_PREFLIGHT,
-    LUMI_ENGINE_RED, /* the preflight failed: nothing was started */
-    LUMI_ENGINE_HOMING,
-    LUMI_ENGINE_ARMING,
-    LUMI_ENGINE_SWEEPING,
-    LUMI_ENGINE_PAUSING,
-    LUMI_ENGINE_PAUSED,      /* by the operator, or because the disk is slow (it goes on by itself then) */
-    LUMI_ENGINE_INTERRUPTED, /* fault, board away, e-stop, crash: `text` says what has to be done */
-    LUMI_ENGINE_DRAINING,    /* the sweep is over; frames are still coming */
-    LUMI_ENGINE_SEALING,
-    LUMI_ENGINE_DONE, /* sealed: complete, or with frames that stay missing */
-    LUMI_ENGINE_FAILED
-};
-#define LUMI_ENGINE_STATES 13
-const char *lumi_engine_state_name(enum lumi_engine_state state);
 
 enum lumi_verdict { LUMI_GREEN = 0, LUMI_YELLOW, LUMI_RED, LUMI_UNDECIDED };
 const char *lumi_verdict_name(enum lumi_verdict verdict);

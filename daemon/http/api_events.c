@@ -70,7 +70,7 @@ static void describe(JsonBuilder *builder, const struct lumi_engine_told *told, 
 {
     lumi_api_put_time(builder, "time", told->unix_us);
     if (told->kind == LUMI_TALE_STATE)
-        lumi_api_put_text(builder, "state", lumi_engine_state_name(status->state));
+        lumi_api_put_text(builder, "state", lumi_engine_state_name(told->state));
     if (told->kind == LUMI_TALE_CHECK && told->check >= 0 && told->check < status->check_count)
         lumi_api_check(builder, &status->checks[told->check]);
     if (told->kind == LUMI_TALE_SHOT || told->kind == LUMI_TALE_FRAME)

@@ -124,11 +124,8 @@ static void log_told(struct lumi_service *service, const struct lumi_engine_told
 
     switch (told->kind) {
     case LUMI_TALE_STATE:
-        lumi_engine_status(service->engine, service->status);
-        lumi_service_log(6, "%s%s%s", lumi_engine_state_name(service->status->state), told->text[0] ? ": " : "",
-                         told->text);
-        sd_notifyf(0, "STATUS=%s%s%s", lumi_engine_state_name(service->status->state), told->text[0] ? ": " : "",
-                   told->text);
+        lumi_service_log(6, "%s%s%s", lumi_engine_state_name(told->state), told->text[0] ? ": " : "", told->text);
+        sd_notifyf(0, "STATUS=%s%s%s", lumi_engine_state_name(told->state), told->text[0] ? ": " : "", told->text);
         break;
     case LUMI_TALE_CHECK:
     case LUMI_TALE_SHOT:

@@ -26,8 +26,11 @@ static int64_t now_ns(void *context)
 static void tell(enum lumi_engine_tale kind, int shot, const char *text)
 {
     static uint64_t number;
-    struct lumi_engine_told told = {
-        .kind = kind, .number = ++number, .shot = shot, .camera = kind == LUMI_TALE_INCIDENT ? 0 : -1};
+    struct lumi_engine_told told = {.kind = kind,
+                                    .number = ++number,
+                                    .state = engine_double.status.state,
+                                    .shot = shot,
+                                    .camera = kind == LUMI_TALE_INCIDENT ? 0 : -1};
 
     told.unix_us = 1700000000000000 + (int64_t)number * 1000;
     snprintf(told.text, sizeof told.text, "%s", text);

@@ -244,6 +244,8 @@ static void told(void *context, const struct lumi_engine_told *tale)
     if (getenv("BENCH_TELL"))
         fprintf(stderr, "%8.3f kind %d shot %d camera %d: %s\n", (double)b->now * 1e-9, (int)tale->kind, tale->shot,
                 tale->camera, tale->text);
+    if (tale->kind == LUMI_TALE_STATE)
+        b->states_told |= 1u << tale->state;
     if (tale->kind != LUMI_TALE_INCIDENT)
         return;
     b->incidents++;

@@ -52,6 +52,7 @@ struct bench {
     bool disk_full;
     /* what was told */
     char handed[1024], last_incident[512];
+    unsigned states_told;           /* a bit each */
     int incidents, verdict_rejects; /* the judge rejects so many more */
     struct lumi_engine_status status;
 };

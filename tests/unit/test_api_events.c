@@ -34,6 +34,15 @@ static void tell(struct fixture *fixture, const char *text)
     lumi_http_told(fixture->http, &told);
 }
 
+static void tell_state(struct fixture *fixture, enum lumi_engine_state state)
+{
+    struct lumi_engine_told told = {.kind = LUMI_TALE_STATE, .state = state, .camera = -1};
+
+    engine_double.status.state = state;
+    g_snprintf(told.text, sizeof told.text, "now %s", lumi_engine_state_name(state));
+    lumi_http_told(fixture->http, &told);
+}
+
 static int listen_from(struct fixture *fixture, const char *id, const char *until, GString **got)
 {
     int fd = fixture_connect(fixture);
@@ -208,6 +217,22 @@ static void too_many_listeners_are_refused(void **state)
     close(fds[0]);
 }
 
+static void two_quick_changes_of_state_are_both_shown(void **state)
+{
+    struct fixture *fixture = *state;
+    GString *got;
+    int fd = listen_from(fixture, NULL, "event: progress", &got);
+
+    g_string_free(got, TRUE);
+    tell_state(fixture, LUMI_ENGINE_HOMING); /* the main loop does not come round between the two */
+    tell_state(fixture, LUMI_ENGINE_ARMING);
+    got = fixture_receive(fd, "now arming");
+    assert_non_null(strstr(got->str, "\"state\":\"homing\",\"text\":\"now homing\""));
+    assert_non_null(strstr(got->str, "\"state\":\"arming\",\"text\":\"now arming\""));
+    g_string_free(got, TRUE);
+    close(fd);
+}
+
 static void progress_comes_when_something_has_changed(void **state)
 {
     GString *got;
@@ -245,6 +270,7 @@ int main(void)
         CASE(who_sleeps_costs_nothing_and_is_told_what_it_missed),
         CASE(who_takes_nothing_for_a_minute_is_hung_up_on),
         CASE(too_many_listeners_are_refused),
+        CASE(two_quick_changes_of_state_are_both_shown),
         CASE(progress_comes_when_something_has_changed),
         CASE(the_server_ends_while_somebody_listens),
     };

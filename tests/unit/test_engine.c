@@ -19,6 +19,11 @@ static void assert_sealed_whole(struct bench *b)
     assert_int_equal(result.problems, 0);
 }
 
+static unsigned bit(enum lumi_engine_state state)
+{
+    return 1u << state;
+}
+
 static void a_sweep_ends_as_a_sealed_capture_with_every_frame(void **state)
 {
     struct bench b;
@@ -33,6 +38,10 @@ static void a_sweep_ends_as_a_sealed_capture_with_every_frame(void **state)
     assert_int_equal(b.status.missing, 0);
     assert_int_equal(b.starts, 1);
     assert_int_equal(b.homes, 1);
+    /* Every change tells the state it led to, however short that lasted. */
+    assert_int_equal(b.states_told, bit(LUMI_ENGINE_PREFLIGHT) | bit(LUMI_ENGINE_HOMING) | bit(LUMI_ENGINE_ARMING) |
+                                        bit(LUMI_ENGINE_SWEEPING) | bit(LUMI_ENGINE_DRAINING) |
+                                        bit(LUMI_ENGINE_SEALING) | bit(LUMI_ENGINE_DONE));
     assert_string_equal(b.handed, b.status.capture);
     assert_int_equal(b.stored, b.event_number); /* every event of the board was acknowledged */
     assert_int_equal(b.frames_out, 0);
