@@ -101,14 +101,22 @@ static bool rule_is_there(const struct lumi_doctor *doctor, const char *name)
 
 static void check_rules(struct lumi_doctor *doctor)
 {
-    static const char name[] = "70-lumirig.rules";
+    static const char *const rules[][2] = {
+        {"70-lumirig.rules", "only root may open the board"},
+        {"71-lumid.rules", "only root may use USB3 Vision cameras and GPIO lines, and cameras may be put to sleep"}};
+    bool whole = true;
 
-    if (rule_is_there(doctor, name))
-        lumi_doctor_say(doctor, LUMI_DOCTOR_GREEN, "udev rules", NULL, "%s is installed", name);
-    else
+    for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
+        if (rule_is_there(doctor, rules[i][0]))
+            continue;
+        whole = false;
         lumi_doctor_say(doctor, LUMI_DOCTOR_YELLOW, "udev rules",
                         "install the package, or copy it to /etc/udev/rules.d and run udevadm control --reload",
-                        "%s is not installed: only root may open the board", name);
+                        "%s is not installed: %s", rules[i][0], rules[i][1]);
+    }
+    if (whole)
+        lumi_doctor_say(doctor, LUMI_DOCTOR_GREEN, "udev rules", NULL, "%s and %s are installed", rules[0][0],
+                        rules[1][0]);
 }
 
 /* Is the user, by name, or one of the groups of this program in the line of /etc/group? */

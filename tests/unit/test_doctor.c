@@ -100,7 +100,8 @@ static void a_bare_computer_is_told_what_it_lacks(void **state)
     (void)state;
     options.captures = "/nowhere/captures";
     struct found *found = examine(&options);
-    expect(found, "udev rules", LUMI_DOCTOR_YELLOW, "not installed");
+    expect(found, "udev rules", LUMI_DOCTOR_YELLOW, "70-lumirig.rules is not installed");
+    expect(found, "udev rules", LUMI_DOCTOR_YELLOW, "71-lumid.rules is not installed");
     expect(found, "disk", LUMI_DOCTOR_RED, "/nowhere/captures");
     assert_false(is_named(found, "network buffers"));
     assert_false(is_named(found, "board"));
@@ -113,17 +114,31 @@ static void a_computer_that_is_set_up_is_green(void **state)
 
     (void)state;
     put("/etc/udev/rules.d/70-lumirig.rules", "");
+    put("/usr/lib/udev/rules.d/71-lumid.rules", "");
     put("/proc/sys/net/core/rmem_max", "33554432\n");
     put("/proc/meminfo", "MemTotal: 9 kB\nMemAvailable:   8388608 kB\n");
     put("/sys/class/net/eth7/mtu", "9000\n");
     put("/sys/class/net/eth7/type", "1\n");
     put("/sys/class/net/eth7/carrier", "1\n");
     struct found *found = examine(&options);
-    expect(found, "udev rules", LUMI_DOCTOR_GREEN, "installed");
+    expect(found, "udev rules", LUMI_DOCTOR_GREEN, "are installed");
     expect(found, "network buffers", LUMI_DOCTOR_GREEN, "32768 KiB");
     expect(found, "network eth7", LUMI_DOCTOR_GREEN, "9000 bytes");
     expect(found, "memory", LUMI_DOCTOR_GREEN, "8.0 GiB");
     expect(found, "disk", LUMI_DOCTOR_GREEN, root);
+    free(found);
+}
+
+static void rules_that_are_there_in_part_are_yellow_by_name(void **state)
+{
+    struct lumi_doctor_options options = defaults();
+
+    (void)state;
+    put("/lib/udev/rules.d/70-lumirig.rules", "");
+    struct found *found = examine(&options);
+    expect(found, "udev rules", LUMI_DOCTOR_YELLOW, "71-lumid.rules is not installed");
+    for (int i = 0; i < found->count; i++)
+        assert_null(strstr(found->list[i].found, "70-lumirig.rules"));
     free(found);
 }
 
@@ -212,6 +227,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         CASE(a_bare_computer_is_told_what_it_lacks),
         CASE(a_computer_that_is_set_up_is_green),
+        CASE(rules_that_are_there_in_part_are_yellow_by_name),
         CASE(what_is_too_small_is_yellow),
         CASE(a_clock_in_the_past_is_red),
         CASE(a_user_is_told_the_groups_it_is_not_in),
