@@ -7,14 +7,17 @@ truncate -s 256M "$work/disk"
 mke2fs -q -t ext4 "$work/disk" 2>/dev/null || /sbin/mke2fs -q -t ext4 "$work/disk"
 : >"$work/acknowledged"
 qemu="$qemu -drive file=$work/disk,format=raw,if=virtio,cache=writeback"
-host_asked() {
+power_asked() {
     [ "$1" = storing ] && [ $cuts -lt "$wanted" ] && [ "$2" -gt 8 ] || return 0
     cuts=$((cuts + 1))
     seed=$(((seed * 1103515245 + 12345) % 2147483648))
-    after=$(((seed / 65536) % 1200))
+    after=$(((seed / 65536) % ${most:-1200}))
     echo "power cut $cuts, $after ms after it began"
     (sleep "$((after / 1000)).$(printf %03d $((after % 1000)))"; kill -9 "$machine") &
     killer=$!
+}
+host_asked() {
+    power_asked "$@"
 }
 host_again() {
     [ -z "$killer" ] || wait $killer 2>/dev/null || true
@@ -22,6 +25,10 @@ host_again() {
     if [ -z "$1" ]; then
         return 0
     fi
+    [ -s "$work/acknowledged" ] || {
+        echo "$cuts power cuts"
+        return 1
+    }
     echo "$cuts power cuts, $(grep -c stored "$work/acknowledged") frames were said to be stored, each once: $(grep stored "$work/acknowledged" | sort | uniq -d | wc -l) twice"
     return 1
 }
