@@ -10,7 +10,7 @@ mkdir /disk/captures
 lumi rig profile set $here/profile.txt
 start_lumid
 lumi devices
-lumi capture start $here/plan.txt --name place --preflight --watch || true
+lumi capture start $here/plan.txt --name place --preflight
 lumi capture status --checks
 
 lumi capture start $here/plan.txt --name place
