@@ -32,6 +32,15 @@ char *lumi_api_problem_text(unsigned status, const char *word, const char *detai
     return lumi_api_finish(builder);
 }
 
+char *lumi_api_problem_message(unsigned status, const char *word, const char *detail)
+{
+    g_autofree char *document = lumi_api_problem_text(status, word, detail);
+
+    return g_strdup_printf("HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nContent-Length: "
+                           "%zu\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n%s",
+                           status, soup_status_get_phrase(status), strlen(document), document);
+}
+
 void lumi_api_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail)
 {
     lumi_api_answer(message, status, "application/problem+json", lumi_api_problem_text(status, word, detail));

@@ -286,6 +286,7 @@ void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, con
     listener->message = g_object_ref(message);
     listener->next = where_to_begin(events, message);
     listener->written_ns = http->options.now_ns(http->options.context);
+    lumi_api_guard_spare(http->guard, message); /* look_after instead */
     soup_server_message_set_status(message, 200, NULL);
     soup_message_headers_set_content_type(headers, "text/event-stream", NULL);
     soup_message_headers_replace(headers, "Cache-Control", "no-store");

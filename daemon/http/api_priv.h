@@ -10,11 +10,13 @@
 #include <libsoup/soup.h>
 
 struct lumi_api_events;
+struct lumi_api_guard;
 struct lumi_http {
     struct lumi_http_options options; /* its strings are copies */
     SoupServer *server;
     struct lumi_api_worker *worker;
     struct lumi_api_events *events;
+    struct lumi_api_guard *guard;
     struct lumi_engine_status *status; /* for one handler at a time */
     bool https;
     int port;
@@ -30,6 +32,8 @@ void lumi_api_answer_json(SoupServerMessage *message, unsigned status, JsonBuild
 void lumi_api_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail);
 /* (transfer full) The document itself. */
 char *lumi_api_problem_text(unsigned status, const char *word, const char *detail);
+/* (transfer full) The whole answer, for a connection that the server has nothing to do with; closes it. */
+char *lumi_api_problem_message(unsigned status, const char *word, const char *detail);
 /* For a code of the tree. */
 void lumi_api_problem_of(SoupServerMessage *message, int code, const char *text);
 
@@ -54,6 +58,15 @@ void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, con
 void lumi_api_events_told(struct lumi_api_events *events, const struct lumi_engine_told *told);
 void lumi_api_events_processing(struct lumi_api_events *events, const struct lumi_process_status *status);
 void lumi_api_events_ingest(struct lumi_api_events *events, const struct lumi_ingest_status *status);
+
+/* ---- connections (api_guard.c) ---- */
+
+/* From now on; lumi_api_guard_listeners when the server listens. */
+struct lumi_api_guard *lumi_api_guard_create(struct lumi_http *http);
+void lumi_api_guard_listeners(struct lumi_api_guard *guard);
+void lumi_api_guard_destroy(struct lumi_api_guard *guard);
+/* This answer may take as long as it likes. */
+void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *message);
 
 /* ---- a request that is too large (api_refuse.c) ---- */
 

@@ -104,14 +104,11 @@ static gboolean answer_now(void *context)
 
 void lumi_api_refuse_early(SoupServerMessage *message, unsigned status, const char *word, const char *detail)
 {
-    g_autofree char *document = lumi_api_problem_text(status, word, detail);
     struct pending *pending = g_new0(struct pending, 1);
 
     soup_message_body_set_accumulate(soup_server_message_get_request_body(message), FALSE);
     soup_server_message_pause(message);
     pending->message = g_object_ref(message);
-    pending->answer = g_strdup_printf("HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nContent-Length: "
-                                      "%zu\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n%s",
-                                      status, soup_status_get_phrase(status), strlen(document), document);
+    pending->answer = lumi_api_problem_message(status, word, detail);
     g_idle_add(answer_now, pending);
 }

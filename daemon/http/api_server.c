@@ -9,12 +9,16 @@
 #include <string.h>
 
 #define BODY_MAX (1 << 20)
+#define CONNECTIONS_MAX 256
+#define CONNECTIONS_PEER 64
 
 void lumi_http_options_init(struct lumi_http_options *options)
 {
     memset(options, 0, sizeof *options);
     options->listen = "localhost:8470";
     options->body_max = BODY_MAX;
+    options->connections_max = CONNECTIONS_MAX;
+    options->connections_peer = CONNECTIONS_PEER;
 }
 
 /* ---- who may ask ---- */
@@ -217,9 +221,11 @@ int lumi_http_start(const struct lumi_http_options *options, struct lumi_http **
     LUMI_GOTO(code, out, load_certificate(made, error));
     LUMI_GOTO(code, out, lumi_api_worker_create(&made->worker, error));
     LUMI_GOTO(code, out, lumi_api_events_create(made, &made->events, error));
+    made->guard = lumi_api_guard_create(made);
     soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
     soup_server_add_handler(made->server, NULL, on_request, made, NULL);
     LUMI_GOTO(code, out, listen_at(made, error));
+    lumi_api_guard_listeners(made->guard);
     *http = made;
     made = NULL;
 out:
@@ -233,6 +239,7 @@ void lumi_http_stop(struct lumi_http *http)
         return;
     lumi_api_worker_destroy(http->worker);
     lumi_api_events_destroy(http->events);
+    lumi_api_guard_destroy(http->guard);
     soup_server_disconnect(http->server);
     g_object_unref(http->server);
     g_free(http->status);

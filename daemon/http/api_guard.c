@@ -1,0 +1,285 @@
+/* Connections are bounded, all of them and those of one peer, and none may sit there for ever: descriptors are shared
+ * with cameras, links and the store, which must not go without because somebody opens connections and says nothing.
+ *
+ * 1. libsoup (3.2 to 3.6) says "request-started" when it has accepted a connection, before anything is read, and again
+ *    with the first byte of every further request; so a connection is known from its first moment on, and its socket
+ *    can be shut down then and at any time: libsoup sees the end of the stream, or a write that fails, and lets go.
+ * 2. A connection is over when its GSocket is: a weak reference tells.
+ * 3. libsoup takes its listening socket out of the main loop for good when accepting fails once, which it does when
+ *    the program has run out of descriptors. The listening sockets are therefore watched at a lower priority: that
+ *    watch is called only where libsoup has left a connection waiting, and makes it listen again. */
+#include "daemon/http/api_priv.h"
+
+#include <fcntl.h>
+#include <glib-unix.h>
+#include <string.h>
+#include <unistd.h>
+
+#define SECOND 1000000000LL
+#define REQUEST_NS (30 * SECOND) /* until a request is here, whole; and between two */
+#define ANSWER_NS (120 * SECOND) /* until its answer has been taken */
+#define TICK_MS 500
+#define AGAIN_MS 250
+
+struct connection {
+    struct lumi_api_guard *guard;
+    GSocket *socket; /* not a reference */
+    guint8 peer[16];
+    gsize peer_size; /* 0: unknown */
+    bool here;       /* this computer */
+    int64_t until_ns;
+};
+
+struct watch {
+    struct lumi_api_guard *guard;
+    GSocket *socket;
+    guint source, timer;
+};
+
+struct lumi_api_guard {
+    struct lumi_http *http;
+    GHashTable *connections; /* GSocket → struct connection */
+    GPtrArray *watches;
+    guint tick;
+};
+
+static int64_t now(const struct lumi_api_guard *guard)
+{
+    return guard->http->options.now_ns(guard->http->options.context);
+}
+
+/* ---- connections ---- */
+
+/* An IPv6 peer is a network of 64 bits: whoever has one has all its addresses. */
+static void identify(struct connection *connection)
+{
+    static const guint8 mapped[12] = {[10] = 0xff, [11] = 0xff};
+    g_autoptr(GSocketAddress) address = g_socket_get_remote_address(connection->socket, NULL);
+
+    if (!address || !G_IS_INET_SOCKET_ADDRESS(address))
+        return;
+    GInetAddress *inet = g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(address));
+    const guint8 *bytes = g_inet_address_to_bytes(inet);
+    gsize size = g_inet_address_get_native_size(inet);
+    connection->here = g_inet_address_get_is_loopback(inet);
+    if (size == 16 && !memcmp(bytes, mapped, sizeof mapped)) {
+        bytes += 12;
+        size = 4;
+    } else if (size == 16 && !connection->here)
+        size = 8;
+    memcpy(connection->peer, bytes, size);
+    connection->peer_size = size;
+}
+
+static bool is_same_peer(const struct connection *a, const struct connection *b)
+{
+    return a->peer_size && a->peer_size == b->peer_size && !memcmp(a->peer, b->peer, a->peer_size);
+}
+
+/* Others leave one peer's share to this computer: its operator gets through whatever they do. */
+static bool is_one_too_many(const struct connection *made)
+{
+    const struct lumi_http_options *options = &made->guard->http->options;
+    int all = 0, others = 0, peer = 0;
+    GHashTableIter at;
+    gpointer value;
+
+    g_hash_table_iter_init(&at, made->guard->connections);
+    while (g_hash_table_iter_next(&at, NULL, &value)) {
+        const struct connection *connection = value;
+        if (g_socket_is_closed(connection->socket))
+            continue;
+        all++;
+        others += !connection->here;
+        peer += is_same_peer(connection, made);
+    }
+    return all > options->connections_max || peer > options->connections_peer ||
+           (!made->here && others > options->connections_max - options->connections_peer);
+}
+
+static void refuse(const struct connection *connection)
+{
+    g_autofree char *answer = lumi_api_problem_message(503, "limit", "too many connections are open already");
+
+    if (!connection->guard->http->https)
+        g_socket_send_with_blocking(connection->socket, answer, strlen(answer), FALSE, NULL, NULL);
+    g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
+}
+
+static void on_gone(void *context, GObject *socket)
+{
+    struct lumi_api_guard *guard = context;
+
+    g_hash_table_remove(guard->connections, socket);
+}
+
+static gboolean on_tick(void *context)
+{
+    struct lumi_api_guard *guard = context;
+    int64_t time = now(guard);
+    GHashTableIter at;
+    gpointer value;
+
+    if (!g_hash_table_size(guard->connections)) {
+        guard->tick = 0;
+        return G_SOURCE_REMOVE;
+    }
+    g_hash_table_iter_init(&at, guard->connections);
+    while (g_hash_table_iter_next(&at, NULL, &value)) {
+        struct connection *connection = value;
+        if (time > connection->until_ns) {
+            g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
+            connection->until_ns = INT64_MAX;
+        }
+    }
+    return G_SOURCE_CONTINUE;
+}
+
+static void set_limit(struct lumi_api_guard *guard, SoupServerMessage *message, int64_t until_ns)
+{
+    GSocket *socket = soup_server_message_get_socket(message);
+    struct connection *connection = socket ? g_hash_table_lookup(guard->connections, socket) : NULL;
+
+    if (connection)
+        connection->until_ns = until_ns;
+}
+
+static void on_started(SoupServer *server, SoupServerMessage *message, void *context)
+{
+    struct lumi_api_guard *guard = context;
+    GSocket *socket = soup_server_message_get_socket(message);
+    struct connection *made;
+
+    (void)server;
+    if (!socket)
+        return;
+    if (g_hash_table_contains(guard->connections, socket)) {
+        set_limit(guard, message, now(guard) + REQUEST_NS);
+        return;
+    }
+    made = g_new0(struct connection, 1);
+    *made = (struct connection){.guard = guard, .socket = socket, .until_ns = now(guard) + REQUEST_NS};
+    identify(made);
+    g_hash_table_insert(guard->connections, socket, made);
+    g_object_weak_ref(G_OBJECT(socket), on_gone, guard);
+    if (is_one_too_many(made))
+        refuse(made);
+    if (!guard->tick)
+        guard->tick = g_timeout_add(TICK_MS, on_tick, guard);
+}
+
+static void on_read(SoupServer *server, SoupServerMessage *message, void *context)
+{
+    struct lumi_api_guard *guard = context;
+
+    (void)server;
+    set_limit(guard, message, now(guard) + ANSWER_NS);
+}
+
+static void on_finished(SoupServer *server, SoupServerMessage *message, void *context)
+{
+    struct lumi_api_guard *guard = context;
+
+    (void)server;
+    set_limit(guard, message, now(guard) + REQUEST_NS);
+}
+
+void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *message)
+{
+    set_limit(guard, message, INT64_MAX);
+}
+
+/* ---- listening goes on ---- */
+
+static void look(struct watch *watch);
+
+static gboolean listen_again(void *context)
+{
+    struct watch *watching = context;
+    struct lumi_http *http = watching->guard->http;
+    int spare = fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 0); /* is there a descriptor again? */
+
+    if (spare < 0)
+        return G_SOURCE_CONTINUE;
+    close(spare);
+    watching->timer = 0;
+    if (!soup_server_listen_socket(http->server, watching->socket, http->https ? SOUP_SERVER_LISTEN_HTTPS : 0, NULL))
+        g_warning("HTTP: nobody is listened to any more");
+    look(watching);
+    return G_SOURCE_REMOVE;
+}
+
+static gboolean on_waiting(gint fd, GIOCondition condition, void *context)
+{
+    struct watch *watching = context;
+
+    (void)fd;
+    (void)condition;
+    watching->source = 0;
+    watching->timer = g_timeout_add(AGAIN_MS, listen_again, watching);
+    return G_SOURCE_REMOVE;
+}
+
+static void look(struct watch *watch)
+{
+    watch->source =
+        g_unix_fd_add_full(G_PRIORITY_LOW, g_socket_get_fd(watch->socket), G_IO_IN, on_waiting, watch, NULL);
+}
+
+static void free_watch(void *data)
+{
+    struct watch *watch = data;
+
+    if (watch->source)
+        g_source_remove(watch->source);
+    if (watch->timer)
+        g_source_remove(watch->timer);
+    g_object_unref(watch->socket);
+    g_free(watch);
+}
+
+void lumi_api_guard_listeners(struct lumi_api_guard *guard)
+{
+    GSList *sockets = soup_server_get_listeners(guard->http->server);
+
+    for (GSList *at = sockets; at; at = at->next) {
+        struct watch *made = g_new0(struct watch, 1);
+        *made = (struct watch){.guard = guard, .socket = g_object_ref(at->data)};
+        g_ptr_array_add(guard->watches, made);
+        look(made);
+    }
+    g_slist_free(sockets);
+}
+
+/* ---- life ---- */
+
+struct lumi_api_guard *lumi_api_guard_create(struct lumi_http *http)
+{
+    struct lumi_api_guard *guard = g_new0(struct lumi_api_guard, 1);
+
+    guard->http = http;
+    guard->connections = g_hash_table_new_full(NULL, NULL, NULL, g_free);
+    guard->watches = g_ptr_array_new_with_free_func(free_watch);
+    g_signal_connect(http->server, "request-started", G_CALLBACK(on_started), guard);
+    g_signal_connect(http->server, "request-read", G_CALLBACK(on_read), guard);
+    g_signal_connect(http->server, "request-finished", G_CALLBACK(on_finished), guard);
+    return guard;
+}
+
+void lumi_api_guard_destroy(struct lumi_api_guard *guard)
+{
+    GHashTableIter at;
+    gpointer key;
+
+    if (!guard)
+        return;
+    g_signal_handlers_disconnect_by_data(guard->http->server, guard);
+    if (guard->tick)
+        g_source_remove(guard->tick);
+    g_ptr_array_unref(guard->watches);
+    g_hash_table_iter_init(&at, guard->connections);
+    while (g_hash_table_iter_next(&at, &key, NULL))
+        g_object_weak_unref(key, on_gone, guard);
+    g_hash_table_unref(guard->connections);
+    g_free(guard);
+}
