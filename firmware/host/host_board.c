@@ -180,11 +180,6 @@ void host_board_cut_in_flash(struct host_board *board, uint64_t bytes)
     board->flash_cut = bytes;
 }
 
-uint8_t *host_board_flash(struct host_board *board, int slot)
-{
-    return board->flash[slot];
-}
-
 const struct host_board_counts *host_board_counts(const struct host_board *board)
 {
     return &board->counts;

@@ -81,7 +81,6 @@ void host_board_hang(struct host_board *board, uint64_t until);
 /* Flash. `cut`: the power goes when so many more bytes are written (an erase counts as its slot's size); the board is
  * then without power until host_board_power. UINT64_MAX: no cut. */
 void host_board_cut_in_flash(struct host_board *board, uint64_t bytes);
-uint8_t *host_board_flash(struct host_board *board, int slot); /* BOARD_PROFILE_SLOT_SIZE bytes; stays the board's */
 
 struct host_board_counts {
     uint64_t steps, triggers, polls;

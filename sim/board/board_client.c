@@ -165,11 +165,6 @@ const struct lumi_wire_client *board_client_wire(const struct board_client *c)
     return &c->wire;
 }
 
-void board_client_silence(struct board_client *c, bool silent)
-{
-    c->silent = silent;
-}
-
 /* ---- time ---- */
 
 static int step(struct board_client *c, uint64_t end, struct lumi_error *error)

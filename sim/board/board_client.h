@@ -17,8 +17,6 @@ void board_client_destroy(struct board_client *client);
 const struct lumi_wire_client *board_client_wire(const struct board_client *client);
 /* USB: after an unplugging or a reset of the board, from the beginning again. */
 bool board_client_reconnect(struct board_client *client);
-/* A host that is silent sends nothing and hears nothing. */
-void board_client_silence(struct board_client *client, bool silent);
 
 /* Lets time pass. LUMI_ERR_INTERNAL with the chip's words where it stopped with a fault. */
 int board_client_run(struct board_client *client, double seconds, struct lumi_error *error);

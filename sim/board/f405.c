@@ -537,14 +537,6 @@ enum f405_stop f405_run(struct f405 *chip, uint64_t until)
     return chip->reason;
 }
 
-void f405_request_stop(struct f405 *chip)
-{
-    if (chip->reason == F405_STOP_TIME)
-        chip->reason = F405_STOP_REQUEST;
-    chip->stop = true;
-    chip->attention = true;
-}
-
 uint64_t f405_now(const struct f405 *chip)
 {
     return chip->now;

@@ -29,7 +29,6 @@ struct f405;
 
 enum f405_stop {
     F405_STOP_TIME = 0, /* `until` is reached */
-    F405_STOP_REQUEST,  /* f405_request_stop */
     F405_STOP_LOADER,   /* the program counter is in the chip's own loader */
     F405_STOP_OFF,      /* no power */
     F405_STOP_FAULT     /* f405_fault says what */
@@ -68,7 +67,6 @@ void f405_reset_pin(struct f405 *chip);
 
 /* Runs to cycle `until`, skipping the time in which the core sleeps. */
 enum f405_stop f405_run(struct f405 *chip, uint64_t until);
-void f405_request_stop(struct f405 *chip);
 uint64_t f405_now(const struct f405 *chip);
 const char *f405_fault(const struct f405 *chip); /* NULL: none */
 uint64_t f405_instructions(const struct f405 *chip);

@@ -18,7 +18,6 @@ struct f405_machine {
     GByteArray *sent;         /* on the serial line, by the board */
     uint16_t lines;
     uint64_t mechanics_next; /* as it was when nothing had happened to them since; 0: to be asked */
-    uint64_t cut_at;
 };
 
 /* ---- from the chip ---- */
@@ -127,8 +126,7 @@ static uint64_t outside_next(void *context)
     }
     uint64_t next = m->mechanics_next;
     uint64_t usb = usb_host_next(m->usb);
-    next = usb < next ? usb : next;
-    return m->cut_at < next ? m->cut_at : next;
+    return usb < next ? usb : next;
 }
 
 static void outside_event(void *context, uint64_t now)
@@ -139,8 +137,6 @@ static void outside_event(void *context, uint64_t now)
     m->mechanics_next = 0; /* after it, too: whoever was told may have asked in between */
     if (usb_host_next(m->usb) <= now)
         usb_host_event(m->usb, now);
-    if (m->cut_at <= now)
-        f405_request_stop(m->chip);
 }
 
 static const struct f405_ops ops = {pin_changed, outside_next, outside_event, uart_out, adc};
@@ -152,7 +148,6 @@ struct f405_machine *f405_machine_create(const struct lumi_rig *truth, const str
     struct f405_machine *m = lumi_calloc(1, sizeof *m);
     if (!m)
         return NULL;
-    m->cut_at = F405_NEVER;
     m->steps = g_array_new(FALSE, FALSE, sizeof(struct f405_machine_edge));
     m->triggers = g_array_new(FALSE, FALSE, sizeof(struct f405_machine_edge));
     m->sent = g_byte_array_new();
@@ -217,15 +212,8 @@ enum f405_stop f405_machine_run_to(struct f405_machine *m, uint64_t cycle)
 {
     enum f405_stop stop = F405_STOP_TIME;
     m->mechanics_next = 0; /* the caller may have done something to them */
-    while (stop == F405_STOP_TIME && f405_now(m->chip) < cycle) {
+    while (stop == F405_STOP_TIME && f405_now(m->chip) < cycle)
         stop = f405_run(m->chip, cycle);
-        if (m->cut_at <= f405_now(m->chip)) {
-            m->cut_at = F405_NEVER;
-            f405_machine_power(m, false);
-            if (stop == F405_STOP_REQUEST)
-                stop = F405_STOP_TIME;
-        }
-    }
     outside_event(m, f405_now(m->chip)); /* what the caller does to the mechanics now, it does at this time */
     return stop;
 }
@@ -238,11 +226,6 @@ enum f405_stop f405_machine_run(struct f405_machine *m, double seconds)
 void f405_machine_power(struct f405_machine *m, bool on)
 {
     f405_power(m->chip, on);
-}
-
-void f405_machine_power_cut_at(struct f405_machine *m, uint64_t at)
-{
-    m->cut_at = at;
 }
 
 void f405_machine_power_cut_in_flash(struct f405_machine *m, unsigned operation)

@@ -33,8 +33,6 @@ enum f405_stop f405_machine_run(struct f405_machine *machine, double seconds);
 enum f405_stop f405_machine_run_to(struct f405_machine *machine, uint64_t cycle);
 uint64_t f405_machine_now(const struct f405_machine *machine);
 void f405_machine_power(struct f405_machine *machine, bool on);
-/* The power goes at cycle `at`, wherever the program is then; F405_NEVER: not. */
-void f405_machine_power_cut_at(struct f405_machine *machine, uint64_t at);
 /* The power goes when the flash has been busy for the n-th time from now, in the middle of that operation. */
 void f405_machine_power_cut_in_flash(struct f405_machine *machine, unsigned operation);
 

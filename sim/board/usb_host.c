@@ -106,11 +106,6 @@ void usb_host_reset(struct usb_host *host)
     host->frame_at = host->reset_until + FRAME;
 }
 
-bool usb_host_resetting(const struct usb_host *host)
-{
-    return host->reset_until != F405_NEVER;
-}
-
 void usb_host_suspend(struct usb_host *host, bool suspended)
 {
     uint64_t now = f405_now(host->chip);

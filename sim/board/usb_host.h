@@ -52,7 +52,6 @@ void usb_host_plug(struct usb_host *host, bool plugged);
 bool usb_host_sees_device(const struct usb_host *host);
 /* Drives a reset for 10 ms from now on; toggles and address start anew. */
 void usb_host_reset(struct usb_host *host);
-bool usb_host_resetting(const struct usb_host *host);
 /* No more frames, and the device is told after 3 ms; or 20 ms of resume, then frames again. */
 void usb_host_suspend(struct usb_host *host, bool suspended);
 void usb_host_set_address(struct usb_host *host, int address);

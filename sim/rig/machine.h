@@ -60,7 +60,6 @@ int sim_machine_wait_sweep(struct sim_machine *machine, double seconds, struct l
 /* Releases all faults that stand. */
 int sim_machine_clear(struct sim_machine *machine, struct lumi_error *error);
 int sim_machine_pause(struct sim_machine *machine, struct lumi_error *error);
-int sim_machine_stop(struct sim_machine *machine, bool at_once, struct lumi_error *error);
 /* The state of every shot of the loaded plan, as the board has it, `count` of them. */
 int sim_machine_shots(struct sim_machine *machine, uint8_t *states, int count, struct lumi_error *error);
 /* Asks for the status now. */
@@ -78,7 +77,6 @@ uint32_t sim_machine_events_lost(const struct sim_machine *machine);
 /* The last event of a kind (lumi_wire_Event_…_tag) at or after place `from`, or NULL. */
 const lumi_wire_Event *sim_machine_find(const struct sim_machine *machine, int from, int kind);
 lumi_wire_Status sim_machine_last_status(const struct sim_machine *machine); /* of the last heartbeat */
-bool sim_machine_connected(const struct sim_machine *machine);
 
 /* ---- without a host of ours: the link's bytes ---- */
 /* Our host goes away for good; whatever was under way on the link is lost. */

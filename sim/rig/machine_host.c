@@ -216,14 +216,6 @@ int sim_machine_pause(struct sim_machine *m, struct lumi_error *error)
     return sim_machine_request(m, &request, NULL, error);
 }
 
-int sim_machine_stop(struct sim_machine *m, bool at_once, struct lumi_error *error)
-{
-    lumi_wire_Request request = {.which_command = lumi_wire_Request_stop_tag};
-
-    request.command.stop.at_once = at_once;
-    return sim_machine_request(m, &request, NULL, error);
-}
-
 int sim_machine_shots(struct sim_machine *m, uint8_t *states, int count, struct lumi_error *error)
 {
     for (int at = 0; at < count;) {
@@ -274,9 +266,4 @@ const lumi_wire_Event *sim_machine_find(const struct sim_machine *m, int from, i
 lumi_wire_Status sim_machine_last_status(const struct sim_machine *m)
 {
     return m->status;
-}
-
-bool sim_machine_connected(const struct sim_machine *m)
-{
-    return m->client.state == LUMI_WIRE_CLIENT_OPEN && !m->unplugged;
 }
