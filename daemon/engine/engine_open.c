@@ -179,8 +179,8 @@ int engine_make(struct lumi_engine *e, struct lumi_error *error)
     LUMI_GOTO(code, failed, lumi_store_open(capture, &e->config.store, &e->store, error));
     tell_devices(e);
     return LUMI_OK;
-failed:
-    lumi_capture_close(capture);
+failed: /* a capture that cannot be begun (the disk is full) leaves nothing, and its name is free */
+    lumi_capture_discard(capture);
     return code;
 }
 

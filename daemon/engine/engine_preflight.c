@@ -346,13 +346,16 @@ static void check_disk(struct lumi_engine *e)
 {
     const double shot = bytes_per_shot(e), need = shot * e->shots, rate = shot / engine_spacing(e);
     const bool turning = e->plan.mode == LUMI_PLAN_CONTINUOUS;
-    int64_t free_bytes = e->disk_free;
+    int64_t free_bytes = e->disk_free, seen;
     struct lumi_error error;
 
-    if (free_bytes < 0 && lumi_store_disk(e->config.folder, &free_bytes, &error) != LUMI_OK) {
+    /* Asked now, also where the free bytes were told: a disk may have become read-only since. */
+    if (lumi_store_disk(e->config.folder, &seen, &error) != LUMI_OK) {
         engine_check(e, false, LUMI_RED, "disk", "%.240s", error.text);
         return;
     }
+    if (free_bytes < 0)
+        free_bytes = seen;
     if (need > (double)free_bytes * (1 - e->config.disk_reserve)) {
         engine_check(e, false, LUMI_RED, "disk", "%.2f GB are needed, %.2f GB are free", need * 1e-9,
                      (double)free_bytes * 1e-9);

@@ -128,7 +128,7 @@ struct lumi_store_figures {
 void lumi_store_figures(struct lumi_store *store, struct lumi_store_figures *figures);
 
 /* Before a sweep: free bytes where `path` lies, and what writing there gives, by writing `bytes` and taking them away.
- */
+ * A failure where nothing can be written to the folder: LUMI_ERR_IO. */
 int lumi_store_disk(const char *path, int64_t *free_bytes, struct lumi_error *error);
 int lumi_store_measure(const char *path, size_t bytes, double *bytes_per_second, struct lumi_error *error);
 

@@ -20,6 +20,8 @@ int lumi_store_disk(const char *path, int64_t *free_bytes, struct lumi_error *er
         return lumi_fail_errno(error, path, "look at the disk");
     if (status.f_flag & ST_RDONLY)
         return lumi_fail(error, LUMI_ERR_IO, "%s: the disk is read-only", path);
+    if (faccessat(AT_FDCWD, path, W_OK | X_OK, AT_EACCESS) < 0)
+        return lumi_fail_errno(error, path, "write to the folder");
     *free_bytes = (int64_t)status.f_bavail * (int64_t)status.f_frsize;
     return LUMI_OK;
 }

@@ -462,3 +462,11 @@ void lumi_capture_close(struct lumi_capture *capture)
     }
     release(capture);
 }
+
+void lumi_capture_discard(struct lumi_capture *capture)
+{
+    lumi_capture_rollback(capture, false);
+    capture_db_close(capture);
+    capture_remove_tree(capture->path, NULL);
+    release(capture);
+}

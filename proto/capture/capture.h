@@ -55,6 +55,8 @@ int lumi_capture_seal(struct lumi_capture *capture, const char *date, struct lum
 /* Accepts NULL. A batch that was not committed is rolled back; a capture from lumi_capture_create that was not
  * published is removed. */
 void lumi_capture_close(struct lumi_capture *capture);
+/* Closes it and removes the whole directory: for one of lumi_capture_create_live that cannot be begun after all. */
+void lumi_capture_discard(struct lumi_capture *capture);
 
 /* Between these, rows are committed and files synced once, at the commit, instead of one by one. Not nested. */
 int lumi_capture_begin(struct lumi_capture *capture, struct lumi_error *error);
