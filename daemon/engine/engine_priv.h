@@ -265,6 +265,7 @@ struct lumi_engine {
     int64_t test_ns; /* when the test shot was fired; 0: none was */
     bool test_told;  /* the board has said so */
     int test_rounds;
+    int64_t test_first_ns; /* when the camera that is tested was fired first */
     struct engine_camera cameras[LUMI_RIG_CAMERAS];
 };
 

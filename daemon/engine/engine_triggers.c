@@ -62,12 +62,31 @@ static void note_answer(struct lumi_engine *e, int camera, const struct lumi_cam
     c->answers[c->answer_count++] = answer;
 }
 
+/* A frame of a camera that is not being tested: was it taken before the camera was fired that is? As from a test of its
+ * own that came late, or came twice. What its own answers tell of its clock says so. */
+static bool of_before(const struct lumi_engine *e, int camera, const struct lumi_camera_frame *frame)
+{
+    const struct engine_camera *c = e->cameras + camera;
+
+    for (int i = 0; i < c->answer_count; i++) {
+        const struct engine_test_answer *answer = &c->answers[i];
+        if (frame->sequence != 0 && frame->sequence <= answer->frame.sequence)
+            return true;
+        if (c->identity.device_clock && frame->device_ns != LUMI_CAMERA_NO_TIME &&
+            answer->frame.device_ns != LUMI_MATCH_NO_TIME &&
+            answer->fired_ns + (frame->device_ns - answer->frame.device_ns) < e->test_first_ns - CONFIRM_NS)
+            return true;
+    }
+    return false;
+}
+
 void engine_test_frame(struct lumi_engine *e, int camera, struct lumi_camera_frame *frame)
 {
     struct engine_camera *c = e->cameras + camera;
     struct engine_held *held;
 
-    if (e->test_camera < 0 || e->test_ns == 0) { /* nothing was fired */
+    if (e->test_camera < 0 || e->test_ns == 0 /* nothing was fired */ ||
+        (camera != e->test_camera && of_before(e, camera, frame))) {
         lumi_camera_frame_release(frame);
         return;
     }
@@ -168,6 +187,8 @@ static void fire(struct lumi_engine *e)
     request.command.test_triggers.cameras = 1u << e->cameras[e->test_camera].rig;
     request.command.test_triggers.exposure = e->plan.exposures[0];
     e->test_ns = e->now;
+    if (e->test_rounds == 0)
+        e->test_first_ns = e->now;
     e->test_told = false;
     e->cameras[e->test_camera].round_seen = false;
     engine_ask(e, &request);

@@ -46,6 +46,7 @@ struct bench {
     double exposure[BENCH_CAMERAS];
     int told_exposures;
     bool exchanged;                    /* their trigger wires */
+    bool tests_twice;                  /* frames of test shots come once more, a second later */
     unsigned flaws[64][BENCH_CAMERAS]; /* taken away when they have happened */
     int frames_out;
     /* the disk */

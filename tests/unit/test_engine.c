@@ -131,6 +131,21 @@ static void exchanged_trigger_wires_are_red_and_start_nothing(void **state)
     bench_end(&b);
 }
 
+static void a_test_frame_that_comes_once_more_is_not_the_next_trigger_s(void **state)
+{
+    struct bench b;
+    struct lumi_error error = {0};
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    b.tests_twice = true;
+    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_int_equal(bench_check(&b, "trigger c01")->verdict, LUMI_GREEN);
+    assert_true(bench_status(&b)->complete);
+    bench_end(&b);
+}
+
 static void exposures_of_a_bracket_are_told_to_the_cameras(void **state)
 {
     struct bench b;
@@ -367,6 +382,7 @@ int main(void)
         cmocka_unit_test(late_doubled_damaged_and_wrongly_exposed_frames_are_found),
         cmocka_unit_test(a_frame_that_is_judged_bad_is_taken_again),
         cmocka_unit_test(exchanged_trigger_wires_are_red_and_start_nothing),
+        cmocka_unit_test(a_test_frame_that_comes_once_more_is_not_the_next_trigger_s),
         cmocka_unit_test(exposures_of_a_bracket_are_told_to_the_cameras),
         cmocka_unit_test(a_killed_program_goes_on_where_it_was),
         cmocka_unit_test(a_board_that_restarts_is_homed_and_told_what_is_done),
