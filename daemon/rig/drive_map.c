@@ -1,6 +1,8 @@
 /* Reading the register map of a drive: sections, keys, numbers. Trusts nothing. */
 #include "daemon/rig/drive_map.h"
 
+#include "proto/mechanism/text_line.h"
+
 #include <glib.h>
 #include <math.h>
 #include <stdarg.h>
@@ -314,15 +316,10 @@ int lumi_drive_map_parse(const char *text, size_t size, const char *source, stru
     if (size > LUMI_DRIVE_MAP_TEXT_MAX)
         return lumi_fail(error, LUMI_ERR_LIMIT, "%s: longer than %d bytes", source, LUMI_DRIVE_MAP_TEXT_MAX);
     for (size_t at = 0; at < size;) {
-        const char *end = memchr(text + at, '\n', size - at);
-        size_t length = end ? (size_t)(end - text) - at : size - at;
         p.line++;
-        if (length >= sizeof line || memchr(text + at, '\0', length))
-            return fail(&p, length >= sizeof line ? "the line is too long" : "a zero byte");
-        memcpy(line, text + at, length);
-        line[length] = '\0';
+        if (!lumi_text_line(text, size, &at, line, sizeof line))
+            return fail(&p, "the line is too long or no text");
         LUMI_TRY(read_line(&p, line));
-        at += length + 1;
     }
     return check(&p);
 }

@@ -1,5 +1,6 @@
 /* The rig profile as text: sections, keys, values (docs/rig-profile.md). Reader and writer go by the same table. */
 #include "proto/mechanism/rig_priv.h"
+#include "proto/mechanism/text_line.h"
 #include "proto/mechanism/text_priv.h"
 
 #include <stdio.h>
@@ -367,7 +368,7 @@ int lumi_rig_parse(const char *text, size_t size, const char *source, struct lum
     for (size_t at = 0; at < size;) {
         struct parser *p = &parser;
         p->line++;
-        if (!text_line(text, size, &at, line))
+        if (!lumi_text_line(text, size, &at, line, sizeof line))
             return FAIL(LUMI_ERR_FORMAT, "the line is too long or no text");
         LUMI_TRY(parse_line(p, line));
     }

@@ -1,6 +1,7 @@
 /* The plan of a sweep as text: one section, keys and values (docs/rig-plan.md). */
 #include "proto/mechanism/rig_priv.h"
 #include "proto/mechanism/sweep_plan.h"
+#include "proto/mechanism/text_line.h"
 #include "proto/mechanism/text_priv.h"
 
 #include <math.h>
@@ -258,7 +259,7 @@ int lumi_plan_parse(const char *text, size_t size, const char *source, const str
                          LUMI_PLAN_TEXT_MAX);
     for (size_t at = 0; at < size;) {
         p->line++;
-        if (!text_line(text, size, &at, line))
+        if (!lumi_text_line(text, size, &at, line, sizeof line))
             return FAIL(LUMI_ERR_FORMAT, "the line is too long or no text");
         LUMI_TRY(parse_line(p, line));
     }

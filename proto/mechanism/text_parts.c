@@ -1,4 +1,5 @@
 /* Lines and numbers of the text forms. */
+#include "proto/mechanism/text_line.h"
 #include "proto/mechanism/text_priv.h"
 
 #include <locale.h>
@@ -7,13 +8,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool text_line(const char *text, size_t size, size_t *at, char line[TEXT_LINE])
+bool lumi_text_line(const char *text, size_t size, size_t *at, char *line, size_t room)
 {
     const char *begin = text + *at, *end = memchr(begin, '\n', size - *at);
     size_t length = end ? (size_t)(end - begin) : size - *at;
 
     *at += length + 1;
-    if (length >= TEXT_LINE || memchr(begin, '\0', length))
+    if (length >= room || memchr(begin, '\0', length))
         return false;
     memcpy(line, begin, length);
     line[length] = '\0';

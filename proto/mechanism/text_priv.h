@@ -8,8 +8,6 @@
 #define TEXT_LINE 1024 /* longest line, with its 0: a plan may name 16 cameras in one */
 #define TEXT_NUMBER 40 /* longest number, with its 0 */
 
-/* Copies the line that begins at *at and moves *at behind it; false: longer than TEXT_LINE, or with a 0 in it. */
-bool text_line(const char *text, size_t size, size_t *at, char line[TEXT_LINE]);
 /* Without blanks at either end; cuts `text` in place. */
 char *text_trim(char *text);
 /* Splits "key = value" in place; false: there is no '='. */

@@ -2,6 +2,7 @@
 #include "sim/rig/faults.h"
 
 #include "firmware/board/board.h"
+#include "proto/mechanism/text_line.h"
 #include "sim/random.h"
 #include "sim/rig/mechanics.h"
 
@@ -206,15 +207,10 @@ int sim_fault_script_parse(const char *text, size_t size, const char *source, st
 
     script->count = 0;
     for (size_t at = 0; at < size;) {
-        const char *end = memchr(text + at, '\n', size - at);
-        size_t length = end ? (size_t)(end - text) - at : size - at;
         char copy[LINE], *words[WORDS], *comment;
         line++;
-        if (length >= sizeof copy || memchr(text + at, 0, length))
+        if (!lumi_text_line(text, size, &at, copy, sizeof copy))
             return fail_at(error, source, line, "too long, or not text");
-        memcpy(copy, text + at, length);
-        copy[length] = 0;
-        at += length + 1;
         if ((comment = strchr(copy, '#')))
             *comment = 0;
         int count = split(copy, words);
