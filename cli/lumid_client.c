@@ -1,11 +1,8 @@
 /* lumid, as the commands reach it. */
 #include "cli/lumid_client.h"
 
-#include "proto/base/json_check.h"
-
 #include <errno.h>
 #include <libsoup/soup.h>
-#include <math.h>
 #include <string.h>
 
 #define DEFAULT_ADDRESS "localhost:8470"
@@ -190,56 +187,6 @@ static int no_answer(const struct cli_lumid *lumid, const GError *failed, struct
     return lumi_fail(error, LUMI_ERR_IO, "no answer from lumid at %s: %s", lumid->url, failed->message);
 }
 
-/* The word of a problem's type, and what it is in the tree. */
-static int code_of(const char *word)
-{
-    static const struct {
-        const char *word;
-        int code;
-    } table[] = {
-        {"nomem", LUMI_ERR_NOMEM},         {"io", LUMI_ERR_IO},
-        {"nospace", LUMI_ERR_NOSPACE},     {"busy", LUMI_ERR_BUSY},
-        {"cancelled", LUMI_ERR_CANCELLED}, {"internal", LUMI_ERR_INTERNAL},
-        {"argument", LUMI_ERR_ARG},        {"format", LUMI_ERR_FORMAT},
-        {"version", LUMI_ERR_VERSION},     {"unsupported", LUMI_ERR_UNSUPPORTED},
-        {"checksum", LUMI_ERR_CHECKSUM},   {"notfound", LUMI_ERR_NOTFOUND},
-        {"exists", LUMI_ERR_EXISTS},       {"limit", LUMI_ERR_LIMIT},
-        {"token", LUMI_ERR_ARG},           {"host", LUMI_ERR_ARG},
-    };
-
-    for (size_t i = 0; i < sizeof table / sizeof table[0]; i++)
-        if (!strcmp(table[i].word, word))
-            return table[i].code;
-    return LUMI_ERR_IO;
-}
-
-static int problem_of(const struct cli_lumid *lumid, unsigned status, JsonNode *root, struct lumi_error *error)
-{
-    JsonObject *object = root ? json_node_get_object(root) : NULL;
-    const char *type = object ? cli_json_text(object, "type") : "";
-
-    if (!g_str_has_prefix(type, "urn:lumid:"))
-        return lumi_fail(error, LUMI_ERR_IO, "%s: what answers there is no lumid of this version (status %u)",
-                         lumid->url, status);
-    if (status == 401)
-        return lumi_fail(error, LUMI_ERR_ARG, "lumid at %s: %s: --token-file FILE, or LUMID_TOKEN in the environment",
-                         lumid->url, cli_json_text(object, "detail"));
-    return lumi_fail(error, code_of(type + strlen("urn:lumid:")), "%s", cli_json_text(object, "detail"));
-}
-
-static JsonNode *parse_object(const char *text, gssize size)
-{
-    g_autoptr(JsonParser) parser = json_parser_new();
-    JsonNode *root;
-
-    if (!lumi_json_check(text, (size_t)size) || !json_parser_load_from_data(parser, text, size, NULL))
-        return NULL;
-    root = json_parser_steal_root(parser);
-    if (root && !JSON_NODE_HOLDS_OBJECT(root))
-        g_clear_pointer(&root, json_node_unref);
-    return root;
-}
-
 static int ask(struct cli_lumid *lumid, SoupMessage *message, JsonNode **root, char **text, struct lumi_error *error)
 {
     g_autoptr(GError) failed = NULL;
@@ -250,9 +197,9 @@ static int ask(struct cli_lumid *lumid, SoupMessage *message, JsonNode **root, c
 
     if (!bytes)
         return no_answer(lumid, failed, error);
-    node = parse_object(g_bytes_get_data(bytes, NULL), (gssize)g_bytes_get_size(bytes));
+    node = cli_answer_parse(g_bytes_get_data(bytes, NULL), (gssize)g_bytes_get_size(bytes));
     if (status < 200 || status > 299 || !node)
-        code = problem_of(lumid, status, node, error);
+        code = cli_answer_problem(lumid->url, status, node, error);
     else if (text)
         *text = g_strndup(g_bytes_get_data(bytes, NULL), g_bytes_get_size(bytes));
     if (code == LUMI_OK && root)
@@ -286,43 +233,9 @@ int cli_lumid_post(struct cli_lumid *lumid, const char *path, JsonBuilder *body,
 
 /* ---- events ---- */
 
-struct reading {
-    cli_lumid_event_fn event;
-    void *context;
-    char *id; /* of the last event: where to go on */
-    char kind[32], new_id[64];
-    GString *data;
-    bool more;
-};
-
-/* One line of the stream (HTML Living Standard, 9.2.6). */
-static void take_line(struct reading *reading, const char *line)
-{
-    if (g_str_has_prefix(line, "event: "))
-        g_strlcpy(reading->kind, line + 7, sizeof reading->kind);
-    else if (g_str_has_prefix(line, "id: "))
-        g_strlcpy(reading->new_id, line + 4, sizeof reading->new_id);
-    else if (g_str_has_prefix(line, "data: "))
-        g_string_append(reading->data, line + 6);
-    if (*line)
-        return;
-    if (reading->data->len) {
-        JsonNode *root = parse_object(reading->data->str, (gssize)reading->data->len);
-        reading->more = reading->event(reading->context, reading->kind, reading->new_id, reading->data->str,
-                                       root ? json_node_get_object(root) : NULL);
-        if (root)
-            json_node_unref(root);
-        if (reading->new_id[0]) {
-            g_free(reading->id);
-            reading->id = g_strdup(reading->new_id);
-        }
-    }
-    reading->kind[0] = reading->new_id[0] = '\0';
-    g_string_truncate(reading->data, 0);
-}
-
 /* Until it breaks or enough is read. *talked: events came. */
-static int listen_once(struct cli_lumid *lumid, struct reading *reading, bool *talked, struct lumi_error *error)
+static int listen_once(struct cli_lumid *lumid, struct cli_event_reader *reading, bool *talked,
+                       struct lumi_error *error)
 {
     g_autoptr(SoupMessage) message = make_message(lumid, "GET", "/api/v1/events");
     g_autoptr(GError) failed = NULL;
@@ -340,8 +253,8 @@ static int listen_once(struct cli_lumid *lumid, struct reading *reading, bool *t
         char text[4096];
         gsize size = 0;
         g_input_stream_read_all(G_INPUT_STREAM(lines), text, sizeof text, &size, NULL, NULL);
-        JsonNode *root = parse_object(text, (gssize)size);
-        int code = problem_of(lumid, status, root, error);
+        JsonNode *root = cli_answer_parse(text, (gssize)size);
+        int code = cli_answer_problem(lumid->url, status, root, error);
         if (root)
             json_node_unref(root);
         return code;
@@ -352,7 +265,7 @@ static int listen_once(struct cli_lumid *lumid, struct reading *reading, bool *t
             return lumi_fail(error, LUMI_ERR_IO, "lumid at %s has hung up%s%s", lumid->url, failed ? ": " : "",
                              failed ? failed->message : "");
         *talked = true;
-        take_line(reading, line);
+        cli_event_line(reading, line);
     }
     return LUMI_OK;
 }
@@ -360,7 +273,7 @@ static int listen_once(struct cli_lumid *lumid, struct reading *reading, bool *t
 int cli_lumid_events(struct cli_lumid *lumid, double patience, cli_lumid_event_fn event, void *context,
                      struct lumi_error *error)
 {
-    struct reading reading = {.event = event, .context = context, .data = g_string_new(NULL), .more = true};
+    struct cli_event_reader reading = {.event = event, .context = context, .data = g_string_new(NULL), .more = true};
     int64_t since = g_get_monotonic_time();
     bool ever = false;
     int code;
@@ -374,76 +287,10 @@ int cli_lumid_events(struct cli_lumid *lumid, double patience, cli_lumid_event_f
         }
         if (code != LUMI_ERR_IO || !ever || (double)(g_get_monotonic_time() - since) > patience * 1e6)
             break;
-        reading.kind[0] = reading.new_id[0] = '\0';
-        g_string_truncate(reading.data, 0);
+        cli_event_begin(&reading);
         g_usleep(500000);
     }
     g_free(reading.id);
     g_string_free(reading.data, TRUE);
     return code;
-}
-
-/* ---- members that may be missing ---- */
-
-static JsonNode *value_of(JsonObject *object, const char *name)
-{
-    JsonNode *node = object ? json_object_get_member(object, name) : NULL;
-
-    return node && JSON_NODE_HOLDS_VALUE(node) ? node : NULL;
-}
-
-const char *cli_json_text(JsonObject *object, const char *name)
-{
-    JsonNode *node = value_of(object, name);
-
-    return node && json_node_get_value_type(node) == G_TYPE_STRING ? json_node_get_string(node) : "";
-}
-
-long cli_json_int(JsonObject *object, const char *name)
-{
-    JsonNode *node = value_of(object, name);
-
-    return node ? (long)json_node_get_int(node) : 0;
-}
-
-double cli_json_double(JsonObject *object, const char *name)
-{
-    JsonNode *node = value_of(object, name);
-
-    return node ? json_node_get_double(node) : NAN;
-}
-
-bool cli_json_bool(JsonObject *object, const char *name)
-{
-    JsonNode *node = value_of(object, name);
-
-    return node && json_node_get_boolean(node);
-}
-
-JsonObject *cli_json_object(JsonObject *object, const char *name)
-{
-    JsonNode *node = object ? json_object_get_member(object, name) : NULL;
-
-    return node && JSON_NODE_HOLDS_OBJECT(node) ? json_node_get_object(node) : NULL;
-}
-
-static JsonArray *array_of(JsonObject *object, const char *name)
-{
-    JsonNode *node = object ? json_object_get_member(object, name) : NULL;
-
-    return node && JSON_NODE_HOLDS_ARRAY(node) ? json_node_get_array(node) : NULL;
-}
-
-int cli_json_count(JsonObject *object, const char *name)
-{
-    JsonArray *array = array_of(object, name);
-
-    return array ? (int)json_array_get_length(array) : 0;
-}
-
-JsonObject *cli_json_element(JsonObject *object, const char *name, int i)
-{
-    JsonNode *node = json_array_get_element(array_of(object, name), (guint)i);
-
-    return JSON_NODE_HOLDS_OBJECT(node) ? json_node_get_object(node) : NULL;
 }

@@ -3,8 +3,7 @@
 #define LUMI_CLI_LUMID_CLIENT_H
 
 #include "cli/command.h"
-
-#include <json-glib/json-glib.h>
+#include "cli/lumid_answer.h"
 
 extern char *cli_lumid_address, *cli_lumid_token_file, *cli_lumid_ca;
 #define CLI_LUMID_OPTIONS                                                                                              \
@@ -46,18 +45,7 @@ int cli_lumid_post(struct cli_lumid *lumid, const char *path, JsonBuilder *body,
                    struct lumi_error *error);
 /* Events until `event` returns false, each with its kind and its data as they came, and parsed (an object, or NULL). A
  * connection that breaks is made again where the last one ended, for `patience` seconds; then LUMI_ERR_IO. */
-typedef bool (*cli_lumid_event_fn)(void *context, const char *kind, const char *id, const char *data,
-                                   JsonObject *object);
 int cli_lumid_events(struct cli_lumid *lumid, double patience, cli_lumid_event_fn event, void *context,
                      struct lumi_error *error);
-
-/* Members that may be missing: "", 0, NaN, false, an empty array. */
-const char *cli_json_text(JsonObject *object, const char *name);
-long cli_json_int(JsonObject *object, const char *name);
-double cli_json_double(JsonObject *object, const char *name);
-bool cli_json_bool(JsonObject *object, const char *name);
-JsonObject *cli_json_object(JsonObject *object, const char *name); /* NULL: there is none */
-int cli_json_count(JsonObject *object, const char *name);          /* of an array */
-JsonObject *cli_json_element(JsonObject *object, const char *name, int i);
 
 #endif
