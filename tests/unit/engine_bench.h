@@ -46,7 +46,7 @@ struct bench {
     double exposure[BENCH_CAMERAS];
     int told_exposures;
     bool exchanged;                    /* their trigger wires */
-    bool tests_twice;                  /* frames of test shots come once more, a second later */
+    bool tests_twice;                  /* frames of test shots come once more, 0.4 s later */
     unsigned flaws[64][BENCH_CAMERAS]; /* taken away when they have happened */
     int frames_out;
     /* the disk */
