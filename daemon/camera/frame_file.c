@@ -150,7 +150,8 @@ static int with_head(const struct lumi_camera_frame *frame, const struct lumi_fr
     head.height = format->height;
     head.stride = ordered ? 0 : format->stride;
     head.bits = format->bits;
-    head.narrow = ordered; /* what V4L2 and UVC deliver unless they say otherwise */
+    head.narrow = ordered && !format->full_range;
+    head.bt709 = ordered && format->bt709;
     if (format->layout == LUMI_LAYOUT_BAYER)
         memcpy(head.filter, filters[(unsigned)format->bayer % 4], 4);
     head.black = about->black;

@@ -136,21 +136,23 @@ static void take_raw(const struct lumi_camera_frame *frame, const struct judge_p
     }
 }
 
-/* Y alone, of 16..235 (ITU-R BT.601). */
+/* Y alone, of 16..235 or of all there is. */
 static void take_luma(const struct lumi_camera_frame *frame, const struct judge_plane *plane, struct counts *counts)
 {
     int step = frame->format.layout == LUMI_LAYOUT_YUYV ? 2 : 1;
+    const int black = frame->format.full_range ? 0 : 16, white = frame->format.full_range ? 255 : 235;
+    const int low = black + (frame->format.full_range ? BLACK_U8 : 1);
     float light[256];
 
     for (int i = 0; i < 256; i++)
-        light[i] = i <= 16 ? 0 : lumi_srgb_decode(i >= 235 ? 1 : (float)(i - 16) / 219);
+        light[i] = i <= black ? 0 : lumi_srgb_decode(i >= white ? 1 : (float)(i - black) / (float)(white - black));
     for (int y = 0; y < plane->height; y++) {
         const uint8_t *in = frame->data + (size_t)y * (size_t)frame->format.stride;
         float *out = plane->data + (size_t)y * (size_t)plane->width;
         for (int x = 0; x < plane->width; x++) {
             uint8_t value = in[x * step];
-            counts->white += value >= 234;
-            counts->black += value <= 17;
+            counts->white += value >= white - 1;
+            counts->black += value <= low;
             out[x] = light[value];
         }
     }

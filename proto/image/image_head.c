@@ -229,10 +229,11 @@ static void describe_raw(struct job *job, const struct lumi_head *head)
 /* TIFF 6.0, section 21. */
 static void describe_ycbcr(struct job *job, const struct lumi_head *head)
 {
-    static const double weights[3] = {0.299, 0.587, 0.114}; /* ITU-R BT.601 */
+    /* ITU-R BT.601-7, section 2.5.1; BT.709-6, section 3.2 */
+    static const double bt601[3] = {0.299, 0.587, 0.114}, bt709[3] = {0.2126, 0.7152, 0.0722};
     const double narrow[6] = {16, 235, 128, 240, 128, 240}, full[6] = {0, 255, 128, 255, 128, 255};
 
-    add_fractions(job, &job->main, 529, RATIONAL, weights, 3);
+    add_fractions(job, &job->main, 529, RATIONAL, head->bt709 ? bt709 : bt601, 3);
     add(&job->main, 530, SHORT, 2, 2u | (head->kind == LUMI_HEAD_YCBCR_420 ? 2u : 1u) << 16);
     add(&job->main, 531, SHORT, 1, 1); /* colour samples lie amid their pixels */
     add_fractions(job, &job->main, 532, RATIONAL, head->narrow ? narrow : full, 6);

@@ -38,7 +38,8 @@ struct lumi_head {
     double black;      /* sample value of no light */
     double white[2];   /* white balance: what red and blue are multiplied with to match green; 0: unknown (then 1) */
     double matrix[9];  /* XYZ (D65) → camera's red, green, blue, row by row; all zero: linear sRGB */
-    bool narrow;       /* YCBCR: Y 16..235, C 16..240 (ITU-R BT.601) instead of 0..255 */
+    bool narrow;       /* YCBCR: Y 16..235, C 16..240 instead of 0..255 */
+    bool bt709;        /* YCBCR: the matrix of ITU-R BT.709 instead of BT.601's */
     double exposure_s, iso;
     int64_t unix_us;                              /* when it was taken; INT64_MIN: unknown */
     const char *make, *model, *serial, *software; /* NULL: unknown */

@@ -274,20 +274,26 @@ static void rgb_with_padded_rows_comes_back_exactly(void **state)
     lumi_frame_file_finish(&file);
 }
 
-/* ITU-R BT.601, narrow range. */
-static void expect_colour(const uint8_t *rgb, double y, double u, double v)
+/* ITU-R BT.601 or BT.709, narrow or full range, as the frame's format says. */
+static void expect_colour(const struct lumi_frame_format *format, const uint8_t *rgb, double y, double u, double v)
 {
-    double luma = (y - 16) / 219, b = (u - 128) / 224, r = (v - 128) / 224;
-    const double want[3] = {luma + 1.402 * r, luma - 0.344136 * b - 0.714136 * r, luma + 1.772 * b};
+    const double red = format->bt709 ? 0.2126 : 0.299, blue = format->bt709 ? 0.0722 : 0.114;
+    const double green = 1 - red - blue;
+    double luma = format->full_range ? y / 255 : (y - 16) / 219, colour = format->full_range ? 255 : 224;
+    double b = (u - 128) / colour, r = (v - 128) / colour;
+    const double want[3] = {luma + 2 * (1 - red) * r,
+                            luma - 2 * (1 - blue) * blue / green * b - 2 * (1 - red) * red / green * r,
+                            luma + 2 * (1 - blue) * b};
 
     for (int c = 0; c < 3; c++) {
         double clamped = fmin(fmax(255 * want[c], 0), 255);
         if (fabs(rgb[c] - clamped) > 3) /* libtiff spreads the colour differences over 254 steps, not 255 */
-            fail_msg("channel %d is %d, %.1f wanted (Y %g U %g V %g)", c, rgb[c], clamped, y, u, v);
+            fail_msg("channel %d is %d, %.1f wanted (Y %g U %g V %g, %s, %s range)", c, rgb[c], clamped, y, u, v,
+                     format->bt709 ? "BT.709" : "BT.601", format->full_range ? "full" : "narrow");
     }
 }
 
-static void yuyv_keeps_its_numbers_and_is_read_as_colour(void **state)
+static void keep_yuyv(bool bt709, bool full_range)
 {
     uint8_t data[30 * 160];
     struct lumi_camera_frame frame = {
@@ -295,7 +301,8 @@ static void yuyv_keeps_its_numbers_and_is_read_as_colour(void **state)
     struct lumi_frame_file file;
     struct lumi_raster back;
 
-    (void)state;
+    frame.format.bt709 = bt709;
+    frame.format.full_range = full_range;
     for (size_t i = 0; i < sizeof data; i++)
         data[i] = (uint8_t)(i % 2 ? 98 + 60 * (i / 2 % 2) : 60 + i % 160);
     assert_int_equal(lumi_frame_file_make(&frame, NULL, &file, NULL), LUMI_OK);
@@ -310,13 +317,13 @@ static void yuyv_keeps_its_numbers_and_is_read_as_colour(void **state)
     read_back(&file, &back, NULL);
     for (int y = 0; y < 30; y++)
         for (int x = 0; x < 64; x++)
-            expect_colour(lumi_row_u8(&back, y) + 3 * x, data[160 * y + 2 * x], data[160 * y + 4 * (x / 2) + 1],
-                          data[160 * y + 4 * (x / 2) + 3]);
+            expect_colour(&frame.format, lumi_row_u8(&back, y) + 3 * x, data[160 * y + 2 * x],
+                          data[160 * y + 4 * (x / 2) + 1], data[160 * y + 4 * (x / 2) + 3]);
     lumi_raster_finish(&back);
     lumi_frame_file_finish(&file);
 }
 
-static void nv12_keeps_its_numbers_and_is_read_as_colour(void **state)
+static void keep_nv12(bool bt709, bool full_range)
 {
     uint8_t data[80 * 45];
     struct lumi_camera_frame frame = {
@@ -324,7 +331,8 @@ static void nv12_keeps_its_numbers_and_is_read_as_colour(void **state)
     struct lumi_frame_file file;
     struct lumi_raster back;
 
-    (void)state;
+    frame.format.bt709 = bt709;
+    frame.format.full_range = full_range;
     for (int i = 0; i < 80 * 45; i++)
         data[i] = (uint8_t)(i < 80 * 30 ? 40 + i % 80 + i / 80 * 3 : 128 + (i % 80) - 30);
     assert_int_equal(lumi_frame_file_make(&frame, NULL, &file, NULL), LUMI_OK);
@@ -333,10 +341,24 @@ static void nv12_keeps_its_numbers_and_is_read_as_colour(void **state)
     for (int y = 0; y < 30; y++)
         for (int x = 0; x < 64; x++) {
             const uint8_t *colour = data + 80 * 30 + 80 * (y / 2) + x / 2 * 2;
-            expect_colour(lumi_row_u8(&back, y) + 3 * x, data[80 * y + x], colour[0], colour[1]);
+            expect_colour(&frame.format, lumi_row_u8(&back, y) + 3 * x, data[80 * y + x], colour[0], colour[1]);
         }
     lumi_raster_finish(&back);
     lumi_frame_file_finish(&file);
+}
+
+static void yuyv_keeps_its_numbers_and_is_read_as_colour_of_its_matrix_and_range(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++)
+        keep_yuyv(i & 1, i & 2);
+}
+
+static void nv12_keeps_its_numbers_and_is_read_as_colour_of_its_matrix_and_range(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++)
+        keep_nv12(i & 1, i & 2);
 }
 
 static void jpeg_stays_the_bytes_the_camera_sent(void **state)
@@ -416,8 +438,8 @@ int main(void)
         cmocka_unit_test(brightness_does_not_depend_on_what_else_is_in_the_picture),
         cmocka_unit_test(a_grey_sensor_gives_one_linear_channel),
         cmocka_unit_test(rgb_with_padded_rows_comes_back_exactly),
-        cmocka_unit_test(yuyv_keeps_its_numbers_and_is_read_as_colour),
-        cmocka_unit_test(nv12_keeps_its_numbers_and_is_read_as_colour),
+        cmocka_unit_test(yuyv_keeps_its_numbers_and_is_read_as_colour_of_its_matrix_and_range),
+        cmocka_unit_test(nv12_keeps_its_numbers_and_is_read_as_colour_of_its_matrix_and_range),
         cmocka_unit_test(jpeg_stays_the_bytes_the_camera_sent),
         cmocka_unit_test(a_cameras_own_file_keeps_its_kind),
         cmocka_unit_test(a_frame_that_lacks_bytes_becomes_no_file),
