@@ -251,7 +251,7 @@ static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int 
         return;
     }
     accepted = lumi_judge_verdict(numbers, &e->config.judge, usual_sharpness(c), reason, sizeof reason);
-    if (accepted)
+    if (accepted && numbers->sharpness > 0)
         c->sharp[c->sharp_count++ % ENGINE_SHARP] = (float)numbers->sharpness;
     write_verdict(e, job, accepted, numbers, reason);
 }

@@ -113,8 +113,11 @@ void engine_test_judged(struct lumi_engine *e, int camera, int code, const char 
         check(e, camera, code == LUMI_ERR_FORMAT ? LUMI_RED : LUMI_YELLOW, "focus", reason);
         return;
     }
-    snprintf(reason, sizeof reason, "sharpness %.3f", numbers->sharpness);
-    check(e, camera, numbers->sharpness < 0.05 ? LUMI_YELLOW : LUMI_GREEN, "focus", reason);
+    if (numbers->sharpness > 0)
+        snprintf(reason, sizeof reason, "sharpness %.3f", numbers->sharpness);
+    else
+        snprintf(reason, sizeof reason, "not known: it sees nothing with detail");
+    check(e, camera, numbers->sharpness > 0 && numbers->sharpness < 0.05 ? LUMI_YELLOW : LUMI_GREEN, "focus", reason);
     snprintf(reason, sizeof reason, "%.1f %% at white, %.1f %% at black, mean %.3f", numbers->clipped * 100,
              numbers->dark * 100, numbers->mean);
     check(e, camera, numbers->clipped > e->config.judge.clipped || numbers->mean < 0.005 ? LUMI_YELLOW : LUMI_GREEN,

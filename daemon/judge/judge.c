@@ -179,7 +179,7 @@ bool lumi_judge_verdict(const struct lumi_judge_numbers *n, const struct lumi_ju
 
     if (size > 0)
         reason[0] = '\0';
-    if (usual_sharpness > 0 && n->sharpness < limits->sharpness_share * usual_sharpness) {
+    if (usual_sharpness > 0 && n->sharpness > 0 && n->sharpness < limits->sharpness_share * usual_sharpness) {
         good = false;
         say(&line, "not sharp: %.0f %% of what this camera's frames usually have",
             100 * n->sharpness / usual_sharpness);

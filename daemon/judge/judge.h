@@ -19,7 +19,8 @@ int lumi_judge_picture_create(const struct lumi_camera_frame *frame, struct lumi
 void lumi_judge_picture_destroy(struct lumi_judge_picture *picture);
 
 struct lumi_judge_numbers {
-    double sharpness; /* share of the detail that an ideal lens would leave; comparable between frames of one camera */
+    double sharpness; /* share of the detail that an ideal lens would leave; comparable between frames of one camera; 0:
+                         nothing to tell it by, a plain wall */
     double blur_pixels;    /* length of the smear along its direction, from the picture's spectrum; 0: none seen */
     double blur_angle;     /* its direction, radians from the picture's x towards y, 0..π */
     double clipped;        /* share of pixels at white */

@@ -6,7 +6,7 @@
  * 2. To the sides of the ray's image nothing belongs that the poses are right about: the median of what is found there
  *    is how far the picture is shifted in that direction. Neighbours in different directions give both components.
  * 3. A block that no neighbour has, although it should be seen there, is something that moved (or is hidden from all of
- *    them). */
+ *    them). Only neighbours so near by that no thing comes before another by much of a block can tell. */
 #include "daemon/judge/judge_priv.h"
 #include "proto/base/memory.h"
 
@@ -17,7 +17,9 @@
 #define DEPTHS 24
 #define INVERSE_MOST 1.6      /* 1/m: nothing is nearer than that */
 #define REACH 12              /* small pixels to either side */
+#define PARALLAX_MOST 12      /* small pixels between far and near: with more, a block has parts hidden behind others */
 #define DIFFERENCE_FLOOR 0.06 /* of a block's mean: contrast less than that says nothing */
+#define COVERED_LEAST 4       /* of so many blocks one must be seen beside, or nothing is said of things that moved */
 #define WHITE 0.9f            /* small pixels from here on are partly white: they say nothing */
 #define MATCH 0.35            /* difference, of the blocks' own contrast, up to which they are the same */
 
@@ -31,6 +33,7 @@ struct view {
 /* One block in one neighbour. */
 struct match {
     bool seen;
+    bool near_by;      /* little parallax: what is not found, is not there */
     double side;       /* where it was found, small pixels off the ray's image */
     double nx, ny;     /* that direction in the neighbour, unit */
     double difference; /* of what was found */
@@ -163,6 +166,7 @@ static void find_block(const struct job *job, int x0, int y0, double middle, dou
     double dx = near.x[0] - far.x[0], dy = near.y[0] - far.y[0], length = hypot(dx, dy);
     int depths = (int)(length / 0.7) + 1;
     depths = depths > DEPTHS ? DEPTHS : depths;
+    match->near_by = length <= PARALLAX_MOST;
     match->nx = length > 0.5 ? -dy / length : 1;
     match->ny = length > 0.5 ? dx / length : 0;
     for (int d = 0; d < depths; d++) {
@@ -317,9 +321,9 @@ int judge_compare(const struct lumi_judge_picture *picture, const struct lumi_le
         int before = sums.neighbours;
         compare_one(&job, scratch, expected, &sums);
         for (int i = 0; sums.neighbours > before && i < blocks; i++) {
-            if (job.matches[i].seen)
+            if (job.matches[i].seen && job.matches[i].near_by)
                 state[i] |= 1;
-            if (job.matches[i].seen && job.matches[i].difference < MATCH)
+            if (job.matches[i].seen && job.matches[i].near_by && job.matches[i].difference < MATCH)
                 state[i] |= 2;
         }
     }
@@ -331,7 +335,7 @@ int judge_compare(const struct lumi_judge_picture *picture, const struct lumi_le
         numbers->exposure_stops = median(sums.stops, sums.neighbours);
     if (sums.with_shift > 0)
         numbers->shift_pixels = solve_shift(&sums) * picture->step;
-    if (covered >= 6)
+    if (covered >= 6 && COVERED_LEAST * covered >= blocks)
         numbers->moved = (double)lost / covered;
     lumi_free(job.matches);
     lumi_free(scratch);

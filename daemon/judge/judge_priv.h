@@ -20,7 +20,8 @@ struct lumi_judge_picture {
     int step;
     double sharpness, blur_pixels, blur_angle, clipped, dark, mean;
     double blur_explained, blur_depth, blur_length; /* of the best smear, found or not */
-    double noise;                                   /* standard deviation of a pixel of the frame, linear */
+    double blur_groups[4]; /* the depth in each quarter of the picture; NaN: nothing to be seen there */
+    double noise;          /* standard deviation of a pixel of the frame, linear */
 };
 
 /* The whole frame as light; counts pixels at white and at black on the way. The caller releases plane->data. */

@@ -1,2 +1,4 @@
 add_executable(bench_judge bench_judge.c)
 target_link_libraries(bench_judge PRIVATE lumi_flags lumi_judge lumi_sim)
+add_executable(bench_judge_good bench_judge_good.c)
+target_link_libraries(bench_judge_good PRIVATE lumi_flags lumi_judge lumi_sim lumi_capture lumi_image)

@@ -1,5 +1,6 @@
 /* What is wrong with a frame is found and measured, and nothing is found where nothing is wrong. */
 #include "judge_world.h"
+#include "sim/rigs.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -94,6 +95,43 @@ static void nothing_is_found_in_a_good_frame(void **state)
     assert_string_equal(reason, "");
 }
 
+/* Few parts that lie beside each other, wide angles, a floor whose boards all run one way: what stripes are taken for.
+ */
+static void small_pictures_of_a_wide_rig_are_good_and_their_smears_are_found(void **state)
+{
+    struct sim_rig_options options;
+    struct sim_scene *scene;
+    struct sim_rig rig;
+    int found = 0;
+
+    (void)state;
+    sim_rig_options_init(&options);
+    options.width = 160;
+    options.height = 128;
+    assert_int_equal(sim_rig_init(&rig, "arc:3x6:0.35", &options, NULL), LUMI_OK);
+    assert_int_equal(sim_place_open("room", &scene, NULL), LUMI_OK);
+    for (int i = 0; i < rig.count; i++) {
+        const struct fault none = {.full_well = 10000, .seed = (unsigned)i + 1},
+                           smeared = {.smear = 6, .angle = i * 0.7, .full_well = 10000, .seed = (unsigned)i + 1};
+        struct lumi_raster light;
+        assert_int_equal(sim_camera_render(scene, &rig.views[i].lens, &rig.views[i].pose, 0, &light, NULL, NULL),
+                         LUMI_OK);
+        struct lumi_judge_picture *good = world_picture(&light, &none), *bad = world_picture(&light, &smeared);
+        struct lumi_judge_numbers a, b;
+        lumi_judge_measure(good, NULL, NULL, 0, 0, NULL, 0, &a, NULL);
+        lumi_judge_measure(bad, NULL, NULL, 0, 0, NULL, 0, &b, NULL);
+        if (a.blur_pixels > 0)
+            fail_msg("view %d is taken for smeared over %.1f pixels", i, a.blur_pixels);
+        found += fabs(b.blur_pixels / 6 - 1) < 0.25;
+        lumi_judge_picture_destroy(good);
+        lumi_judge_picture_destroy(bad);
+        lumi_raster_finish(&light);
+    }
+    assert_true(found >= rig.count * 3 / 4);
+    sim_scene_destroy(scene);
+    sim_rig_finish(&rig);
+}
+
 static void a_smear_is_measured_in_length_and_direction(void **state)
 {
     (void)state;
@@ -120,6 +158,8 @@ static void defocus_takes_sharpness_and_is_no_smear(void **state)
     assert_false(lumi_judge_verdict(&b, &limits, a.sharpness, reason, sizeof reason));
     assert_non_null(strstr(reason, "not sharp"));
     assert_true(lumi_judge_verdict(&b, &limits, 0, reason, sizeof reason)); /* the first frame has no measure */
+    b.sharpness = 0;                                                        /* a plain wall: nothing to tell it by */
+    assert_true(lumi_judge_verdict(&b, &limits, a.sharpness, reason, sizeof reason));
 }
 
 static void clipped_highlights_are_counted(void **state)
@@ -262,6 +302,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_is_found_in_a_good_frame),
+        cmocka_unit_test(small_pictures_of_a_wide_rig_are_good_and_their_smears_are_found),
         cmocka_unit_test(a_smear_is_measured_in_length_and_direction),
         cmocka_unit_test(defocus_takes_sharpness_and_is_no_smear),
         cmocka_unit_test(clipped_highlights_are_counted),
