@@ -62,6 +62,8 @@ struct lumi_camera_frame {
                                 queue was full */
     bool damaged;            /* packets are missing, the driver says error: `data` is what there is */
     double exposure_s, gain; /* as the camera reports them for this frame; 0: it does not (gain: linear, 1 = base) */
+    double black, white[2];  /* raw, as it reports them: sample value of no light, what red and blue are multiplied with
+                                to match green; 0: it does not */
     double temperature;      /* °C; NaN: unknown */
     uint64_t trigger;        /* the device's own trigger count, where it has one (chunk data) */
     uint32_t packets_resent, packets_missing;         /* of this frame, GigE Vision */

@@ -402,6 +402,11 @@ static void describe(struct libcamera_camera *camera, const struct shim_result *
     frame->gap = gap;
     frame->exposure_s = result->exposure_s;
     frame->gain = result->gain;
+    if (frame->format.layout == LUMI_LAYOUT_BAYER || frame->format.layout == LUMI_LAYOUT_GREY) {
+        frame->black = ldexp(result->black, frame->format.bits - 16);
+        frame->white[0] = result->white[0];
+        frame->white[1] = result->white[1];
+    }
     frame->temperature = camera->temperature;
     camera->frames++;
     camera->damaged += frame->damaged;

@@ -94,6 +94,12 @@ void shim_camera::onDone(Request *request)
     result.sensor_ns = said.get(controls::SensorTimestamp).value_or(0);
     result.exposure_s = said.get(controls::ExposureTime).value_or(0) * 1e-6;
     result.gain = said.get(controls::AnalogueGain).value_or(0) * said.get(controls::DigitalGain).value_or(1);
+    if (const auto black = said.get(controls::SensorBlackLevels))
+        result.black = (*black)[0];
+    if (const auto gains = said.get(controls::ColourGains)) {
+        result.white[0] = static_cast<double>((*gains)[0]);
+        result.white[1] = static_cast<double>((*gains)[1]);
+    }
     result.has_temperature = said.get(controls::SensorTemperature).has_value();
     result.temperature = said.get(controls::SensorTemperature).value_or(0);
     done(context, &result);

@@ -38,6 +38,7 @@ struct shim_result { /* of a request: what the camera says of the frame; 0: noth
     uint32_t sequence, used[SHIM_PLANES];
     int64_t buffer_ns, sensor_ns;
     double exposure_s, gain, temperature;
+    double black, white[2]; /* black: of 65536; gains of red and blue */
     bool has_temperature;
 };
 enum shim_can { SHIM_CAN_EXPOSE = 1, SHIM_CAN_GAIN = 2, SHIM_CAN_WHITE_BALANCE = 4, SHIM_CAN_FRAME_TIME = 8 };

@@ -154,9 +154,9 @@ static int with_head(const struct lumi_camera_frame *frame, const struct lumi_fr
     head.bt709 = ordered && format->bt709;
     if (format->layout == LUMI_LAYOUT_BAYER)
         memcpy(head.filter, filters[(unsigned)format->bayer % 4], 4);
-    head.black = about->black;
-    head.white[0] = about->white[0];
-    head.white[1] = about->white[1];
+    head.black = about->black > 0 ? about->black : frame->black;
+    for (int i = 0; i < 2; i++)
+        head.white[i] = about->white[i] > 0 ? about->white[i] : frame->white[i];
     head.exposure_s = file->exposure_s;
     head.iso = file->iso;
     head.unix_us = about->unix_us;

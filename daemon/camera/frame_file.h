@@ -13,8 +13,7 @@
 /* What the file says besides the frame's own; init: nothing. */
 struct lumi_frame_about {
     const char *make, *model, *serial; /* NULL: unknown */
-    double black;                      /* raw: sample value of no light */
-    double white[2];                   /* raw: what red and blue are multiplied with; 0: unknown */
+    double black, white[2];            /* raw, instead of what the frame says; 0: what it says */
     int64_t unix_us;                   /* when it was exposed; INT64_MIN: unknown */
 };
 void lumi_frame_about_init(struct lumi_frame_about *about, const struct lumi_camera_identity *identity);

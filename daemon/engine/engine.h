@@ -30,6 +30,8 @@ struct lumi_engine_camera {
     char name[LUMI_RIG_NAME];           /* of the rig's profile */
     char address[256];                  /* as for lumi_camera_open: for messages; which camera it is the caller knows */
     struct lumi_camera_setting setting; /* exposure_s 0: the plan's */
+    double black, white_red, white_blue; /* raw: sample value of no light; what red and blue are multiplied with. 0:
+                                            what the frame says */
     bool sync_line; /* its exposures are seen by an edge (GPIO of the host; the board's feedback needs nothing here) */
     bool optional;  /* a sweep may begin without it */
 };

@@ -74,11 +74,11 @@ void engine_account_free(struct lumi_engine *e)
     for (int i = 0; i < e->flight_count; i++) {
         struct engine_flight *flight = e->flights[i];
         if (flight->used) {
-            if (flight->file)
-                lumi_frame_file_finish(flight->file);
+            if (flight->filing)
+                lumi_frame_file_finish(&flight->filing->file);
             engine_held_drop(flight->held);
         }
-        lumi_free(flight->file);
+        lumi_free(flight->filing);
         lumi_free(flight->path);
         lumi_free(flight);
     }
@@ -134,10 +134,10 @@ static void land(struct lumi_engine *e, struct engine_flight *flight)
         if (at < (uint64_t)e->event_count && e->events[at].pending > 0)
             e->events[at].pending--;
     }
-    if (flight->file) {
-        lumi_frame_file_finish(flight->file);
-        lumi_free(flight->file);
-        flight->file = NULL;
+    if (flight->filing) {
+        lumi_frame_file_finish(&flight->filing->file);
+        lumi_free(flight->filing);
+        flight->filing = NULL;
     }
     lumi_free(flight->path);
     flight->path = NULL;

@@ -1,5 +1,4 @@
 /* Frames: which shot each is of, and onto the disk with it. */
-#include "daemon/camera/frame_file.h"
 #include "daemon/engine/engine_priv.h"
 #include "proto/base/memory.h"
 
@@ -43,6 +42,8 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
         engine_test_frame(e, camera, frame);
         return;
     }
+    if (e->config.cameras[camera].black > 0)
+        frame->black = e->config.cameras[camera].black;
     if (!engine_taking(e) || !c->used || !c->match) {
         lumi_camera_frame_release(frame);
         return;
@@ -75,10 +76,10 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
 static int make_file(void *context, struct lumi_store_job *job, struct lumi_error *error)
 {
     struct engine_flight *flight = context;
-    struct lumi_frame_file *file = flight->file;
+    struct lumi_frame_file *file = &flight->filing->file;
 
     lumi_frame_file_finish(file); /* of an attempt before */
-    LUMI_TRY(lumi_frame_file_make(flight->held->frame, NULL, file, error));
+    LUMI_TRY(lumi_frame_file_make(flight->held->frame, &flight->filing->about, file, error));
     job->piece_count = file->count;
     for (int i = 0; i < file->count; i++)
         job->pieces[i] = file->pieces[i];
@@ -101,15 +102,38 @@ static bool exposure_as_planned(const struct lumi_engine *e, int shot, int camer
     return frame->exposure_s <= 0 || fabs(log2(frame->exposure_s / planned)) < 1.0 / 6;
 }
 
+/* What the file says besides the frame: the camera may be another one by the time that it is written. */
+static struct engine_filing *describe(const struct lumi_engine *e, int shot, int camera)
+{
+    const struct lumi_engine_camera *set = e->config.cameras + camera;
+    const struct lumi_camera_identity *identity = &e->cameras[camera].identity;
+    const struct engine_frame *frame = e->frames + (size_t)shot * (size_t)e->config.camera_count + (size_t)camera;
+    int64_t exposed_ns = frame->exposed_ns != LUMI_NO_TIME ? frame->exposed_ns : e->account_shots[shot].expected_ns;
+    struct engine_filing *filing = lumi_calloc(1, sizeof *filing);
+
+    if (!filing)
+        return NULL;
+    memcpy(filing->vendor, identity->vendor, sizeof filing->vendor);
+    memcpy(filing->model, identity->model, sizeof filing->model);
+    memcpy(filing->serial, identity->serial, sizeof filing->serial);
+    filing->about = (struct lumi_frame_about){.make = filing->vendor,
+                                              .model = filing->model[0] ? filing->model : NULL,
+                                              .serial = filing->serial,
+                                              .black = set->black,
+                                              .white = {set->white_red, set->white_blue},
+                                              .unix_us = engine_unix_us(e, exposed_ns)};
+    return filing;
+}
+
 static void store_frame(struct lumi_engine *e, int shot, int camera, struct engine_held *held)
 {
     const struct lumi_camera_frame *frame = held->frame;
     struct engine_flight *flight = engine_flight(e, LUMI_STORE_FRAME);
 
     if (flight)
-        flight->file = lumi_calloc(1, sizeof(struct lumi_frame_file));
+        flight->filing = describe(e, shot, camera);
     engine_frame_go(e, shot, camera, AT_RECEIVED, NULL);
-    if (!flight || !flight->file) {
+    if (!flight || !flight->filing) {
         engine_frame_lost(e, shot, camera, "no memory");
         engine_held_drop(held);
         if (flight) {

@@ -16,6 +16,7 @@
 #ifndef LUMI_DAEMON_ENGINE_ENGINE_PRIV_H
 #define LUMI_DAEMON_ENGINE_ENGINE_PRIV_H
 
+#include "daemon/camera/frame_file.h"
 #include "daemon/engine/engine.h"
 #include "daemon/engine/match.h"
 
@@ -96,6 +97,13 @@ struct engine_held {
     size_t bytes;
 };
 
+/* What a frame's file is made of, in a writer's thread. */
+struct engine_filing {
+    struct lumi_frame_file file;
+    struct lumi_frame_about about;
+    char vendor[LUMI_CAMERA_TEXT], model[LUMI_CAMERA_TEXT], serial[LUMI_CAMERA_TEXT]; /* the camera's, as it was then */
+};
+
 /* A job of the store that is not done, with all that is needed to give it once more. */
 struct engine_flight {
     bool used, given;
@@ -105,7 +113,7 @@ struct engine_flight {
     int64_t retry_ns;
     int tries;
     struct engine_held *held;
-    void *file; /* struct lumi_frame_file, of FRAME */
+    struct engine_filing *filing; /* of FRAME */
     char *path;
     struct lumi_store_job job;
 };

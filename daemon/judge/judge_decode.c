@@ -115,8 +115,10 @@ static unsigned raw_sample(const struct lumi_camera_frame *frame, int x, int y)
 static void take_raw(const struct lumi_camera_frame *frame, const struct judge_plane *plane, struct counts *counts)
 {
     bool bayer = frame->format.layout == LUMI_LAYOUT_BAYER;
-    unsigned white = (1u << frame->format.bits) - 1, high = white - white / 100, low = white / 256;
-    float unit = 1 / (float)white;
+    unsigned white = (1u << frame->format.bits) - 1, high = white - white / 100;
+    float black = frame->black > 0 && frame->black < 0.9 * white ? (float)frame->black : 0;
+    float unit = 1 / ((float)white - black);
+    unsigned low = (unsigned)(black + ((float)white - black) / 256);
 
     for (int y = 0; y < plane->height; y++) {
         float *out = plane->data + (size_t)y * (size_t)plane->width;
@@ -125,13 +127,13 @@ static void take_raw(const struct lumi_camera_frame *frame, const struct judge_p
             unsigned own = raw_sample(frame, x, y);
             counts->white += own >= high;
             counts->black += own <= low;
-            out[x] = (float)own * unit;
+            out[x] = ((float)own - black) * unit;
             if (!bayer)
                 continue;
             int right = x + 1 < plane->width ? x + 1 : x - 1;
             unsigned sum =
                 own + raw_sample(frame, right, y) + raw_sample(frame, x, below) + raw_sample(frame, right, below);
-            out[x] = (float)sum * unit / 4;
+            out[x] = ((float)sum / 4 - black) * unit;
         }
     }
 }

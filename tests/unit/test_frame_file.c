@@ -121,6 +121,8 @@ static double psnr(const struct lumi_raster *a, const struct lumi_raster *b, int
     return -10 * log10(sum / count);
 }
 
+static bool told_by_frame; /* black level and white balance: by the frame, not by what is known besides */
+
 static double developed(const struct sensor *sensor, struct lumi_image_meta *meta)
 {
     struct lumi_camera_frame frame;
@@ -134,9 +136,9 @@ static double developed(const struct sensor *sensor, struct lumi_image_meta *met
     about.make = "Example";
     about.model = "Example 5M";
     about.serial = "20-117";
-    about.black = sensor->black;
-    about.white[0] = 1 / sensor->red;
-    about.white[1] = 1 / sensor->blue;
+    *(told_by_frame ? &frame.black : &about.black) = sensor->black;
+    (told_by_frame ? frame.white : about.white)[0] = 1 / sensor->red;
+    (told_by_frame ? frame.white : about.white)[1] = 1 / sensor->blue;
     about.unix_us = 1795428318250000;
     if (lumi_frame_file_make(&frame, &about, &file, &error) != LUMI_OK)
         fail_msg("%s", error.text);
@@ -175,6 +177,18 @@ static void a_bayer_frame_kept_as_dng_is_developed_to_what_the_camera_saw(void *
             if (found < depths[i].least)
                 fail_msg("filter %d, %d bits: %.2f dB", bayer, depths[i].bits, found);
         }
+}
+
+static void black_level_and_white_balance_are_the_frames_own_where_nobody_says_otherwise(void **state)
+{
+    const struct sensor sensor = {LUMI_BAYER_BGGR, 12, 0, 128, 0.6, 0.75};
+
+    (void)state;
+    double told = developed(&sensor, NULL);
+    told_by_frame = true;
+    double own = developed(&sensor, NULL);
+    told_by_frame = false;
+    assert_true(told > 36 && fabs(own - told) < 1e-6);
 }
 
 static void padding_of_rows_is_left_out(void **state)
@@ -433,6 +447,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_bayer_frame_kept_as_dng_is_developed_to_what_the_camera_saw),
+        cmocka_unit_test(black_level_and_white_balance_are_the_frames_own_where_nobody_says_otherwise),
         cmocka_unit_test(padding_of_rows_is_left_out),
         cmocka_unit_test(a_raw_file_tells_exposure_time_camera_and_serial_number),
         cmocka_unit_test(brightness_does_not_depend_on_what_else_is_in_the_picture),

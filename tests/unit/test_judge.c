@@ -257,6 +257,14 @@ static void raw_and_developed_frames_are_judged_alike(void **state)
     assert_true(fabs(raw.mean / rgb.mean - 1) < 0.1);
     assert_true(fabs(raw.clipped - rgb.clipped) < 0.03);
     assert_true(raw.sharpness > 0.2 && raw.blur_pixels == 0);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) /* the same on a black level */
+        data[i] = (uint16_t)(400 + data[i] * 3695 / 4095);
+    frame.black = 400;
+    struct lumi_judge_numbers lifted;
+    assert_int_equal(lumi_judge_picture_create(&frame, &picture, &error), LUMI_OK);
+    assert_int_equal(lumi_judge_measure(picture, NULL, NULL, 0, 0, NULL, 0, &lifted, NULL), LUMI_OK);
+    lumi_judge_picture_destroy(picture);
+    assert_true(fabs(lifted.mean - raw.mean) < 0.001 && fabs(lifted.dark - raw.dark) < 0.01);
     frame.size -= 1;
     assert_int_equal(lumi_judge_picture_create(&frame, &picture, &error), LUMI_ERR_FORMAT);
     lumi_free(data);

@@ -112,7 +112,8 @@ static void cameras_have_their_settings_and_lines(void **state)
 {
     (void)state;
     assert_int_equal(parse("[camera c00]\naddress=aravis:A1\ntrigger = software\nexposure_s = 0.004\n"
-                           "gain = 2\noptional = yes\n; a comment\n[camera c01] \naddress = files:/media/card\n"
+                           "gain = 2\nblack_level = 64\nwhite_red = 1.7\nwhite_blue = 1.4\noptional = yes\n; a "
+                           "comment\n[camera c01] \naddress = files:/media/card\n"
                            "sync = gpio-sim.0:7,active-low\n\n[gpio]\n\testop = gpiochip0:stop,debounce_us=500"),
                      LUMI_OK);
     const struct lumi_engine_camera *cameras = config->engine.cameras;
@@ -121,6 +122,8 @@ static void cameras_have_their_settings_and_lines(void **state)
     assert_string_equal(cameras[0].address, "aravis:A1");
     assert_int_equal(cameras[0].setting.trigger, LUMI_TRIGGER_SOFTWARE);
     assert_true(cameras[0].setting.exposure_s == 0.004 && cameras[0].setting.gain == 2);
+    assert_true(cameras[0].black == 64 && cameras[0].white_red == 1.7 && cameras[0].white_blue == 1.4);
+    assert_true(cameras[1].black == 0 && cameras[1].white_red == 0);
     assert_true(cameras[0].optional && !cameras[0].sync_line);
     assert_int_equal(cameras[1].setting.trigger, LUMI_TRIGGER_HARDWARE);
     assert_true(!cameras[1].optional && cameras[1].sync_line);
