@@ -37,7 +37,6 @@ sleep 2
 echo "emergency stop after $(status_of stored) frames"
 echo pull-up >"$lines/sim_gpio0/pull"
 wait_state 60 interrupted
-lumi rig status --link usb: || true
 echo pull-down >"$lines/sim_gpio0/pull"
 sleep 1
 lumi capture clear
