@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#define PAUSE_SECONDS 5.0 /* until a board that goes on sweeping is asked once more to pause */
 #define FLIGHTS_AT_ONCE 256
 #define HOME_SECONDS 1800.0
 #define STATUS_SECONDS 10.0
@@ -101,6 +102,29 @@ static bool ask_home(struct lumi_engine *e)
     return false;
 }
 
+static bool cameras_ready(const struct lumi_engine *e)
+{
+    for (int c = 0; c < e->config.camera_count; c++)
+        if (e->cameras[c].used && !e->cameras[c].identity.records_itself && !engine_camera_ready(e, c))
+            return false;
+    return true;
+}
+
+/* The board goes on by itself, and nobody takes what it fires: it waits until the cameras are armed again. */
+static bool pause_board(struct lumi_engine *e)
+{
+    const lumi_wire_Request request = {.which_command = lumi_wire_Request_pause_tag};
+
+    if (engine_since(e, e->stage_ns) >= PAUSE_SECONDS * e->stage_at) {
+        e->stage_at++;
+        engine_send(e, &request);
+    }
+    engine_wake(e, 0.5);
+    if (engine_since(e, e->stage_ns) > e->config.rig_patience)
+        engine_interrupt(e, false, "the board does not come to rest");
+    return e->stage != STAGE_HOME;
+}
+
 bool engine_stage_home(struct lumi_engine *e)
 {
     /* What it said before this stage may be of a sweep that has ended since. */
@@ -115,6 +139,8 @@ bool engine_stage_home(struct lumi_engine *e)
         if (e->link.status.state == lumi_wire_State_SWEEPING || e->link.status.state == lumi_wire_State_WINDING) {
             /* It goes on with what this program started before it died. */
             if (e->link.status.plan_crc == lumi_wire_plan_crc(&e->plan)) {
+                if (!cameras_ready(e))
+                    return pause_board(e);
                 engine_go(e, STAGE_SWEEP);
                 e->begun_ns = e->rest_ns = (int64_t)e->link.status_ns;
                 e->moving = true;
