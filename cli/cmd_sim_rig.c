@@ -16,7 +16,7 @@
 static char *profile, *rig_text = "arc16", *size_text, *faults_path, *folder, *layout = "raw", *process;
 static double scale = 1, speed = 1, full_well, read_noise, exposure = 0.004, position_time = 2, patience = 120;
 static int seed = 1, processes, first_host = 2, bits, port = 8470;
-static gboolean own_network;
+static gboolean own_network, drive;
 static volatile sig_atomic_t stop;
 
 static const GOptionEntry options[] = {
@@ -27,6 +27,8 @@ static const GOptionEntry options[] = {
     {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale, "shrinks its counts and resolution alike (1)", "S"},
     {"size", 0, 0, G_OPTION_ARG_STRING, &size_text, "size of the pictures, whatever the scale", "WxH"},
     {"profile", 0, 0, G_OPTION_ARG_FILENAME, &profile, "a rig of one's own instead: its profile", "FILE"},
+    {"drive", 0, 0, G_OPTION_ARG_NONE, &drive,
+     "an industrial drive turns the platform: a Modbus server, with drive.map (docs/rig-drive.md)", NULL},
     {"faults", 0, 0, G_OPTION_ARG_FILENAME, &faults_path, "what goes wrong, and when (docs/rig-simulation.md)", "FILE"},
     {"seed", 0, 0, G_OPTION_ARG_INT, &seed, "of jitter, bounce and noise; in the cameras' serial numbers (1)", "S"},
     {"speed", 0, 0, G_OPTION_ARG_DOUBLE, &speed, "virtual seconds a second (1)", "FACTOR"},
@@ -148,6 +150,10 @@ static int run(int argc, char **argv, struct lumi_error *error)
     if (faults_path)
         LUMI_TRY(read_faults(&script, error));
     rig.place = argv[0];
+    rig.drive = drive;
+    if (drive)
+        rig.rig.control.motion.drive = LUMI_RIG_DRIVE_EXTERNAL;
+    LUMI_TRY(lumi_rig_check(&rig.rig, error));
     rig.seed = (uint64_t)seed;
     rig.speed = speed;
     rig.processes = processes;

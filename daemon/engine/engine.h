@@ -116,10 +116,11 @@ struct lumi_engine_ports {
     void (*rig_stored)(void *context, const lumi_wire_Event *event); /* lumi_rig_link_stored */
     void (*rig_emergency_stop)(void *context);
     int64_t (*rig_to_host)(void *context, uint64_t board_ns); /* CLOCK_MONOTONIC; 0: clocks are not matched yet */
-    /* A sweep with an industrial drive (lumi_rig_drive_sweep); `states`: a byte a shot, 1 fired, valid until it is
-     * answered by lumi_engine_rig_reply. NULL where there is no drive. */
+    /* A sweep with an industrial drive (lumi_rig_drive_sweep); `states`: a byte a shot, 1 fired, valid for the
+     * call; `reset`: somebody has looked, an alarm of the drive may be reset. Answered by lumi_engine_rig_reply. NULL
+     * where there is no drive. */
     void (*drive_sweep)(void *context, uint32_t number, const struct lumi_rig *rig, const struct lumi_plan *plan,
-                        uint32_t first_shot, const uint8_t *states);
+                        uint32_t first_shot, const uint8_t *states, bool reset);
     void (*drive_cancel)(void *context); /* between two positions */
     /* Answered by a notice of LUMI_CAMERA_DONE. */
     void (*camera_command)(void *context, int camera, uint32_t number, const struct lumi_camera_command *command);

@@ -138,6 +138,7 @@ int lumi_engine_resume(struct lumi_engine *e, int64_t now_ns, struct lumi_error 
     }
     set_session(e, "taking");
     e->tries = 0;
+    e->drive_reset = true;
     e->pause = PAUSE_NONE;
     e->want_pause = false;
     e->go_on = true;

@@ -224,6 +224,7 @@ struct lumi_engine {
     uint8_t *board_shots; /* as the board says */
     uint8_t *drive_states;
     bool driving;       /* the sweep is a drive's */
+    bool drive_reset;   /* somebody has said that it goes on: an alarm that the drive has may be reset */
     uint32_t drive_out; /* number of the drive_sweep that is to be answered; 0 none */
     bool check_rig;     /* the capture's profile has not been compared with the board's yet */
     char name[256], title[256];

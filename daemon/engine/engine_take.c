@@ -387,7 +387,9 @@ static void begin_driving(struct lumi_engine *e, int first)
     e->driving = true;
     e->ask = (struct engine_ask){.number = ++e->next_number};
     e->drive_out = e->ask.number;
-    e->ports.drive_sweep(e->ports.context, e->ask.number, &e->rig, &e->plan, (uint32_t)first, e->drive_states);
+    e->ports.drive_sweep(e->ports.context, e->ask.number, &e->rig, &e->plan, (uint32_t)first, e->drive_states,
+                         e->drive_reset);
+    e->drive_reset = false;
 }
 
 static bool ask_start(struct lumi_engine *e)

@@ -131,7 +131,8 @@ struct drive_task {
     uint32_t number, first_shot;
     struct lumi_rig rig;
     struct lumi_plan plan;
-    const uint8_t *states;
+    uint8_t *states; /* our own: the engine may be through with the capture before the drive has stopped */
+    bool reset;
     int code;
     struct lumi_error error;
 };
@@ -165,13 +166,27 @@ static bool drive_cancelled(void *context)
     return atomic_load(&((struct lumi_service *)context)->drive_cancel);
 }
 
+/* One that knows where it is need not look for it again; of one that cannot tell, a sweep from the beginning does. */
+static int must_home(struct lumi_rig_drive *drive, uint32_t first_shot, bool *home, struct lumi_error *error)
+{
+    const struct lumi_drive_map *map = lumi_rig_drive_map(drive);
+    struct lumi_rig_drive_status status;
+
+    LUMI_TRY(lumi_rig_drive_status(drive, &status, error));
+    *home = map->home.used && (map->homed.used ? !status.homed : first_shot == 0);
+    return LUMI_OK;
+}
+
 static void drive_work(struct lumi_task *task)
 {
     struct drive_task *asked = (struct drive_task *)task;
     struct lumi_service *service = asked->service;
     struct lumi_rig_drive *drive = NULL;
+    bool home = false;
 
     asked->code = lumi_rig_drive_open(service->config->drive, &service->drive_map, &drive, &asked->error);
+    if (asked->code == LUMI_OK)
+        asked->code = must_home(drive, asked->first_shot, &home, &asked->error);
     if (asked->code == LUMI_OK) {
         struct lumi_rig_drive_sweep sweep = {.link = service->link,
                                              .drive = drive,
@@ -179,7 +194,8 @@ static void drive_work(struct lumi_task *task)
                                              .plan = &asked->plan,
                                              .first_shot = asked->first_shot,
                                              .states = asked->states,
-                                             .home = asked->first_shot == 0,
+                                             .home = home,
+                                             .reset = asked->reset && service->drive_map.reset.used,
                                              .context = service,
                                              .notice = drive_notice,
                                              .cancelled = drive_cancelled};
@@ -193,13 +209,14 @@ static void drive_done(struct lumi_task *task)
     struct drive_task *asked = (struct drive_task *)task;
 
     asked->service->drive_busy = false;
+    g_free(asked->states);
     lumi_engine_rig_reply(asked->service->engine, lumi_service_now(), asked->number, asked->code, asked->error.text,
                           NULL);
     lumi_inbox_wake(asked->service->inbox);
 }
 
 static void drive_sweep(void *context, uint32_t number, const struct lumi_rig *rig, const struct lumi_plan *plan,
-                        uint32_t first_shot, const uint8_t *states)
+                        uint32_t first_shot, const uint8_t *states, bool reset)
 {
     struct lumi_service *service = context;
     struct drive_task *asked = lumi_service_task(sizeof *asked, drive_work, drive_done);
@@ -209,7 +226,8 @@ static void drive_sweep(void *context, uint32_t number, const struct lumi_rig *r
     asked->rig = *rig;
     asked->plan = *plan;
     asked->first_shot = first_shot;
-    asked->states = states;
+    asked->states = g_memdup2(states, (size_t)lumi_plan_shots(plan));
+    asked->reset = reset;
     atomic_store(&service->drive_cancel, false);
     service->drive_busy = true;
     give(service->drives, service, &asked->task, &asked->code, &asked->error);

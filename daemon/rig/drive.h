@@ -53,7 +53,8 @@ struct lumi_rig_drive_sweep {
     uint32_t fired, lost, next_shot;
 };
 /* LUMI_ERR_UNSUPPORTED: not a start-stop plan, or not a rig with an external drive. LUMI_ERR_BUSY: the board refuses,
- * a fault stands, the drive is not enabled. LUMI_ERR_IO: the drive is silent, faulted, or did not get there. */
+ * a fault of its own or an alarm of the drive stands (somebody has to look), the drive is not enabled. LUMI_ERR_IO: the
+ * drive is silent or did not get there. */
 int lumi_rig_drive_sweep(struct lumi_rig_drive_sweep *sweep, struct lumi_error *error);
 
 #endif

@@ -87,7 +87,7 @@ static int judge_drive(struct lumi_rig_drive_sweep *sweep, const struct lumi_rig
     const char *name = lumi_rig_drive_map(sweep->drive)->name;
 
     if (status->fault)
-        return lumi_fail(error, LUMI_ERR_IO, "drive %s: fault %d", name, status->fault_code);
+        return lumi_fail(error, LUMI_ERR_BUSY, "drive %s: fault %d", name, status->fault_code);
     if (!status->enabled)
         return lumi_fail(error, LUMI_ERR_BUSY, "drive %s is not enabled (the board's enable line, the emergency stop)",
                          name);

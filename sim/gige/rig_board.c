@@ -25,6 +25,7 @@ struct board_process {
     uint64_t clock_told;
     double exposure[LUMI_RIG_CAMERAS]; /* s */
     bool unplugged[LUMI_RIG_CAMERAS];
+    struct rig_message drive_told;
     struct fired fired[LUMI_RIG_CAMERAS][FIRED];
     volatile sig_atomic_t stop;
 };
@@ -128,6 +129,31 @@ static void tell_clock(struct board_process *b, struct sim_machine *machine)
         tell(b, i, &(struct rig_message){.kind = RIG_MESSAGE_CLOCK, .now_ns = now});
 }
 
+/* The enable line, and what the fault script does to the drive. */
+static void tell_drive(struct board_process *b, struct sim_machine *machine)
+{
+    const struct sim_mechanics *m = sim_machine_mechanics(machine);
+    const struct sim_drive_fault *fault = sim_mechanics_drive_faults(m);
+    const struct rig_message now = {
+        .kind = RIG_MESSAGE_DRIVE, .on = sim_mechanics_enabled(m), .alarm = fault->alarm, .silent = fault->silent};
+    const struct rig_message *told = &b->drive_told;
+
+    if (b->setup->drive < 0 || (now.on == told->on && now.alarm == told->alarm && now.silent == told->silent))
+        return;
+    b->drive_told = now;
+    (void)!send(b->setup->drive, &now, sizeof now, MSG_NOSIGNAL);
+}
+
+static void hear_drive(struct board_process *b, struct sim_machine *machine)
+{
+    struct rig_message message;
+
+    while (b->setup->drive >= 0 &&
+           recv(b->setup->drive, &message, sizeof message, MSG_DONTWAIT) == (ssize_t)sizeof message)
+        if (message.kind == RIG_MESSAGE_TURNED)
+            sim_mechanics_drive_to(sim_machine_mechanics(machine), message.turns, message.on);
+}
+
 static void hear(struct board_process *b, struct sim_machine *machine, const struct rig_message *message)
 {
     const uint64_t now = sim_machine_now(machine);
@@ -161,6 +187,8 @@ static void turn(void *context, struct sim_machine *machine)
     for (int i = 0; i < b->setup->eye_count; i++)
         while (recv(b->setup->eyes[i], &message, sizeof message, MSG_DONTWAIT) == (ssize_t)sizeof message)
             hear(b, machine, &message);
+    hear_drive(b, machine);
+    tell_drive(b, machine);
     tell_clock(b, machine);
     tell_plugs(b, machine);
     tell_exposures(b, machine);

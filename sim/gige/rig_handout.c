@@ -55,6 +55,15 @@ static void describe_camera(const struct sim_rig_processes *rig, int camera, GSt
         g_string_append_printf(text, "bits = %d\n", rig->bits);
 }
 
+static void describe_drive(const struct sim_rig_processes *rig, GString *text)
+{
+    char address[16];
+
+    sim_rig_processes_address(rig, rig->rig.camera_count, address);
+    g_string_append_printf(text, "drive = tcp:%s:%d\ndrive_map = %s/drive.map\n", address, SIM_RIG_DRIVE_PORT,
+                           rig->folder);
+}
+
 static int write_configuration(const struct sim_rig_processes *rig, struct lumi_error *error)
 {
     g_autoptr(GString) text = g_string_new("# A simulated rig, by lumi sim rig: lumid --config THIS-FILE\n");
@@ -64,11 +73,14 @@ static int write_configuration(const struct sim_rig_processes *rig, struct lumi_
         return lumi_fail_errno(error, captures, "making the folder");
     /* Drawing is slower than a camera, and several share a processor: a frame may be late. Small pictures of plain
      * walls say little about sharpness and exposure. */
+    g_string_append_printf(text, "\n[rig]\nlink = serial:%s/board\n", rig->folder);
+    if (rig->drive)
+        describe_drive(rig, text);
     g_string_append_printf(text,
-                           "\n[rig]\nlink = serial:%s/board\n\n[capture]\nfolder = %s\nframe_patience_s = %g\n"
+                           "\n[capture]\nfolder = %s\nframe_patience_s = %g\n"
                            "memory = 256M\n\n[judge]\nclipped = 0.9\nsharpness_share = 0\nexposure_stops = "
                            "20\nblur_pixels = 1000\n\n[http]\nlisten = localhost:%d\n",
-                           rig->folder, captures, rig->patience, rig->port);
+                           captures, rig->patience, rig->port);
     if (rig->process)
         g_string_append_printf(text, "\n[process]\ncommand = %s\n", rig->process);
     for (int i = 0; i < rig->rig.camera_count; i++)
@@ -83,5 +95,7 @@ int rig_files_write(const struct sim_rig_processes *rig, struct lumi_error *erro
     lumi_rig_print(&rig->rig, text, LUMI_RIG_TEXT_MAX);
     LUMI_TRY(write_text(rig, "rig.txt", text, error));
     LUMI_TRY(write_plan(rig, error));
+    if (rig->drive)
+        LUMI_TRY(write_text(rig, "drive.map", rig_drive_map, error));
     return write_configuration(rig, error);
 }

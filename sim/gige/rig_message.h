@@ -10,13 +10,16 @@ enum rig_message_kind {
     RIG_MESSAGE_EXPOSED,   /* board to cameras */
     RIG_MESSAGE_PLUG,      /* board to cameras: `on` */
     RIG_MESSAGE_FIRE,      /* cameras to board */
-    RIG_MESSAGE_EXPOSURE   /* cameras to board: `seconds`, as it was set */
+    RIG_MESSAGE_EXPOSURE,  /* cameras to board: `seconds`, as it was set */
+    RIG_MESSAGE_DRIVE,     /* board to drive: `on` the enable line; what is wrong with it */
+    RIG_MESSAGE_TURNED     /* drive to board: the platform is at `turns`, `on` the position-reached line */
 };
 struct rig_message {
     enum rig_message_kind kind;
     int camera; /* of the rig */
     bool on;
-    double seconds;
+    double seconds, turns;
+    bool alarm, silent;
     uint64_t now_ns;
     struct sim_gige_exposure exposure;
 };

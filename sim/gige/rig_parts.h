@@ -20,6 +20,7 @@ struct rig_board {
     int report, life; /* pipes from and to the parent: `life` ends when it goes */
     int eyes[RIG_EYES_MAX], eye_count;
     int owner[LUMI_RIG_CAMERAS];
+    int drive; /* a socket to its process; −1: the board turns the platform itself */
 };
 int rig_board_run(const struct rig_board *board, struct lumi_error *error);
 
@@ -29,6 +30,18 @@ struct rig_eyes {
     int first, count; /* its cameras */
 };
 int rig_eyes_run(const struct rig_eyes *eyes, struct lumi_error *error);
+
+struct rig_drive {
+    const struct sim_rig_processes *rig;
+    int report, board;
+};
+int rig_drive_run(const struct rig_drive *drive, struct lumi_error *error);
+
+/* Of the drive's counts, in its registers (lumi_drive_map_parse). */
+#define RIG_DRIVE_COUNTS (-36000.0) /* a turn */
+#define RIG_DRIVE_ZERO 500.0        /* at step 0, once it has homed */
+#define RIG_DRIVE_SPEED 9000.0      /* a second, while nobody has said another */
+extern const char rig_drive_map[];
 
 int rig_files_write(const struct sim_rig_processes *rig, struct lumi_error *error);
 

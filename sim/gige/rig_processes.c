@@ -10,13 +10,16 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
-#define CHILDREN (2 + RIG_EYES_MAX) /* the board, cameras, the caller's command */
-#define PATIENCE_S 10               /* until those that were asked to end are killed */
-#define FIRST_LINES_S 120           /* until all are ready: places take their time to be built */
+#define CHILDREN (3 + RIG_EYES_MAX) /* the board, a drive, cameras, the caller's command */
+#define BOARD (-1)                  /* in place of a number of cameras */
+#define DRIVE (-2)
+#define PATIENCE_S 10     /* until those that were asked to end are killed */
+#define FIRST_LINES_S 120 /* until all are ready: places take their time to be built */
 
 struct child {
     pid_t pid; /* 0: none, or it has ended */
@@ -31,6 +34,7 @@ struct processes {
     int life[2];               /* its writing end is ours alone: the board reads its end */
     int eyes[RIG_EYES_MAX][2]; /* [0] the board's, [1] the cameras' */
     int eye_count;
+    int drive[2];                /* [0] the board's, [1] the drive's; −1 where there is none */
     int first[RIG_EYES_MAX + 1]; /* cameras of process i: first[i] .. first[i + 1] − 1 */
 };
 
@@ -80,9 +84,12 @@ static void close_all(struct processes *p, int keep_a, int keep_b)
         if (*fd >= 0 && *fd != keep_a && *fd != keep_b)
             close(*fd);
     }
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++) {
         if (p->life[i] >= 0 && p->life[i] != keep_a && p->life[i] != keep_b)
             close(p->life[i]);
+        if (p->drive[i] >= 0 && p->drive[i] != keep_a && p->drive[i] != keep_b)
+            close(p->drive[i]);
+    }
 }
 
 static int run_eyes(struct processes *p, int index, int report, struct lumi_error *error)
@@ -92,6 +99,14 @@ static int run_eyes(struct processes *p, int index, int report, struct lumi_erro
 
     close_all(p, eyes.board, -1);
     return rig_eyes_run(&eyes, error);
+}
+
+static int run_drive(struct processes *p, int report, struct lumi_error *error)
+{
+    const struct rig_drive drive = {p->rig, report, p->drive[1]};
+
+    close_all(p, drive.board, -1);
+    return rig_drive_run(&drive, error);
 }
 
 static int run_board(struct processes *p, int report, struct lumi_error *error)
@@ -105,10 +120,13 @@ static int run_board(struct processes *p, int report, struct lumi_error *error)
             board.owner[c] = i;
     }
     close(p->life[1]);
+    board.drive = p->drive[0];
+    if (p->drive[1] >= 0)
+        close(p->drive[1]);
     return rig_board_run(&board, error);
 }
 
-/* What a child's process is, from beginning to end. `which`: −1 the board, else that of cameras. */
+/* What a child's process is, from beginning to end. `which`: BOARD, DRIVE, else that of cameras. */
 static void be_child(struct processes *p, int which, int report)
 {
     struct lumi_error error = {0};
@@ -119,7 +137,9 @@ static void be_child(struct processes *p, int which, int report)
     for (int i = 0; i < p->count; i++)
         if (p->children[i].report >= 0)
             close(p->children[i].report);
-    code = which < 0 ? run_board(p, report, &error) : run_eyes(p, which, report, &error);
+    code = which == BOARD   ? run_board(p, report, &error)
+           : which == DRIVE ? run_drive(p, report, &error)
+                            : run_eyes(p, which, report, &error);
     if (code != LUMI_OK)
         rig_report(report, code, &error);
     _exit(code == LUMI_OK ? 0 : 1);
@@ -134,7 +154,7 @@ static int start_child(struct processes *p, int which, struct lumi_error *error)
         return lumi_fail_errno(error, "the simulated rig", "a pipe");
     child->report = fds[0];
     if (which < 0)
-        snprintf(child->name, sizeof child->name, "the board");
+        snprintf(child->name, sizeof child->name, which == BOARD ? "the board" : "the drive");
     else
         snprintf(child->name, sizeof child->name, "cameras %d to %d", p->first[which], p->first[which + 1] - 1);
     child->pid = fork();
@@ -162,6 +182,8 @@ static int make_links(struct processes *p, struct lumi_error *error)
     for (; p->eye_count < (int)wanted; p->eye_count++)
         if (socketpair(AF_UNIX, SOCK_SEQPACKET, 0, p->eyes[p->eye_count]) != 0)
             return lumi_fail_errno(error, "the simulated rig", "a socket");
+    if (p->rig->drive && socketpair(AF_UNIX, SOCK_SEQPACKET, 0, p->drive) != 0)
+        return lumi_fail_errno(error, "the simulated rig", "a socket");
     if (pipe(p->life) != 0)
         return lumi_fail_errno(error, "the simulated rig", "a pipe");
     fcntl(p->life[1], F_SETFD, FD_CLOEXEC); /* what `ready` starts must not keep the board alive */
@@ -191,13 +213,19 @@ static int hear(struct processes *p, struct child *child, struct lumi_error *err
 static int start_all(struct processes *p, struct lumi_error *error)
 {
     LUMI_TRY(make_links(p, error));
-    LUMI_TRY(start_child(p, -1, error));
+    LUMI_TRY(start_child(p, BOARD, error));
+    if (p->rig->drive)
+        LUMI_TRY(start_child(p, DRIVE, error));
     for (int i = 0; i < p->eye_count; i++)
         LUMI_TRY(start_child(p, i, error));
     for (int i = 0; i < p->eye_count; i++) { /* theirs now: one that goes is noticed by the other end */
         close(p->eyes[i][0]);
         close(p->eyes[i][1]);
         p->eyes[i][0] = p->eyes[i][1] = -1;
+    }
+    for (int i = 0; i < 2 && p->rig->drive; i++) {
+        close(p->drive[i]);
+        p->drive[i] = -1;
     }
     close(p->life[0]);
     p->life[0] = -1;
@@ -311,12 +339,23 @@ static void end_all(struct processes *p)
     close_all(p, -1, -1);
 }
 
+/* A board that was killed had no time to take its terminal's link away. */
+static void remove_link(const struct sim_rig_processes *rig)
+{
+    char link[600];
+    struct stat there;
+
+    snprintf(link, sizeof link, "%s/board", rig->folder);
+    if (lstat(link, &there) == 0 && S_ISLNK(there.st_mode) && stat(link, &there) != 0)
+        unlink(link);
+}
+
 int sim_rig_processes_run(const struct sim_rig_processes *rig, struct lumi_error *error)
 {
-    struct processes p = {.rig = rig, .life = {-1, -1}};
+    struct processes p = {.rig = rig, .life = {-1, -1}, .drive = {-1, -1}};
     int code;
 
-    if (rig->first_host < 1 || rig->first_host + rig->rig.camera_count > 254)
+    if (rig->first_host < 1 || rig->first_host + rig->rig.camera_count + rig->drive > 254)
         return lumi_fail(error, LUMI_ERR_ARG, "addresses from 127.0.0.%d on: too high for %d cameras", rig->first_host,
                          rig->rig.camera_count);
     LUMI_TRY(rig_files_write(rig, error));
@@ -328,5 +367,6 @@ int sim_rig_processes_run(const struct sim_rig_processes *rig, struct lumi_error
     if (code == LUMI_OK)
         code = watch(&p, error);
     end_all(&p);
+    remove_link(rig);
     return code == LUMI_ERR_CANCELLED ? LUMI_OK : code;
 }

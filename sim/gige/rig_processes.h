@@ -14,6 +14,7 @@ struct sim_rig_processes {
     const char *place; /* of sim/place.h */
     struct lumi_rig rig;
     char folder[512]; /* absolute, is there: board, rig.txt, plan.txt, lumid.conf and captures are made in it */
+    bool drive; /* an industrial drive turns the platform: a Modbus server at 127.0.0.first_host + cameras, 1502 */
     uint64_t seed;
     double speed;   /* virtual seconds a second */
     int processes;  /* that draw; 0: as many as there are processors */
@@ -39,7 +40,9 @@ void sim_rig_processes_init(struct sim_rig_processes *rig);
  */
 int sim_rig_processes_run(const struct sim_rig_processes *rig, struct lumi_error *error);
 
-/* "127.0.0.2", and the serial number, of a camera. */
+#define SIM_RIG_DRIVE_PORT 1502 /* the protocol's own, 502, wants rights */
+
+/* "127.0.0.2", and the serial number, of a camera; the drive has the address after the last. */
 void sim_rig_processes_address(const struct sim_rig_processes *rig, int camera, char address[16]);
 void sim_rig_processes_serial(const struct sim_rig_processes *rig, int camera, char serial[16]);
 

@@ -62,6 +62,10 @@ static const struct form {
     {"camera %camera frames single", SIM_FAULT_FRAMES_DOUBLED, 0},
     {"camera %camera frames late @s", SIM_FAULT_FRAMES_LATE, 0},
     {"camera %camera packets lost @", SIM_FAULT_PACKETS_LOST, 0},
+    {"drive alarm", SIM_FAULT_DRIVE_ALARM, 1},
+    {"drive sound", SIM_FAULT_DRIVE_ALARM, 0},
+    {"drive silent", SIM_FAULT_DRIVE_SILENT, 1},
+    {"drive answers", SIM_FAULT_DRIVE_SILENT, 0},
 };
 
 static const char *const input_names[BOARD_INPUTS] = {"estop", "index",        "slack",  "string-end",

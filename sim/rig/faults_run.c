@@ -20,6 +20,7 @@ struct sim_fault_run {
     double dark;
     double supply; /* V, at the beginning; 0: not yet known */
     struct sim_camera_fault cameras[LUMI_RIG_CAMERAS];
+    struct sim_drive_fault drive;
 };
 
 static void find_next(struct sim_fault_run *run)
@@ -147,6 +148,14 @@ static void mechanics(struct sim_fault_run *run, struct sim_machine *machine, co
         break;
     case SIM_FAULT_SUPPLY:
         sim_mechanics_set_supply(m, on ? fault->value : run->supply);
+        break;
+    case SIM_FAULT_DRIVE_ALARM:
+        run->drive.alarm = on;
+        sim_mechanics_drive_fault(m, &run->drive);
+        break;
+    case SIM_FAULT_DRIVE_SILENT:
+        run->drive.silent = on;
+        sim_mechanics_drive_fault(m, &run->drive);
         break;
     default:
         sim_mechanics_slip(m, (int)fault->value);

@@ -162,6 +162,31 @@ int sim_mechanics_supply_mv(const struct sim_mechanics *m)
     return (int)lround(m->supply * 1000);
 }
 
+bool sim_mechanics_enabled(const struct sim_mechanics *m)
+{
+    return m->outputs[BOARD_OUT_ENABLE];
+}
+
+void sim_mechanics_drive_to(struct sim_mechanics *m, double turns, bool reached)
+{
+    double before = sim_platform_place(m);
+
+    sim_platform_carry(m, turns * m->platform.steps_per_turn);
+    m->reached = reached;
+    sim_switches_look(m, before, m->now);
+    sim_switches_run(m);
+}
+
+const struct sim_drive_fault *sim_mechanics_drive_faults(const struct sim_mechanics *m)
+{
+    return &m->drive_fault;
+}
+
+void sim_mechanics_drive_fault(struct sim_mechanics *m, const struct sim_drive_fault *fault)
+{
+    m->drive_fault = *fault;
+}
+
 double sim_mechanics_turns(const struct sim_mechanics *m)
 {
     return sim_platform_place(m) / m->platform.steps_per_turn;

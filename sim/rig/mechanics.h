@@ -68,6 +68,11 @@ bool sim_mechanics_input(const struct sim_mechanics *mechanics, enum board_input
 bool sim_mechanics_feedback(const struct sim_mechanics *mechanics, int input);
 int sim_mechanics_supply_mv(const struct sim_mechanics *mechanics);
 
+bool sim_mechanics_enabled(const struct sim_mechanics *mechanics); /* the enable line of motor or drive */
+/* A rig with an industrial drive, whose place is the drive's business: it has turned the platform to there by now, and
+ * its position-reached line is so. */
+void sim_mechanics_drive_to(struct sim_mechanics *mechanics, double turns, bool reached);
+
 /* Truth, now (the time last advanced to). */
 double sim_mechanics_turns(const struct sim_mechanics *mechanics); /* the platform, true, in turns from step 0 */
 double sim_mechanics_angle(const struct sim_mechanics *mechanics); /* rad, true direction of the cameras' plane */
@@ -130,6 +135,13 @@ struct sim_camera_fault {
     double frames_late;  /* s */
     double packets_lost; /* share */
 };
+/* Of an industrial drive: for who plays it. */
+struct sim_drive_fault {
+    bool alarm;  /* the cause of one is there */
+    bool silent; /* it answers nothing */
+};
+const struct sim_drive_fault *sim_mechanics_drive_faults(const struct sim_mechanics *mechanics);
+void sim_mechanics_drive_fault(struct sim_mechanics *mechanics, const struct sim_drive_fault *fault);
 const struct sim_camera_fault *sim_mechanics_camera_faults(const struct sim_mechanics *mechanics, int camera);
 /* How long this camera exposes from now on; 0: as the others. */
 void sim_mechanics_set_camera_exposure(struct sim_mechanics *mechanics, int camera, double seconds);

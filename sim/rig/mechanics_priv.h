@@ -77,6 +77,8 @@ struct sim_mechanics {
     bool outputs[BOARD_OUTPUTS];
     bool driver_fault;
     double supply;
+    bool reached; /* an industrial drive's line */
+    struct sim_drive_fault drive_fault;
 
     bool contact[BOARD_INPUTS]; /* what the mechanics say */
     bool level[BOARD_INPUTS];   /* after bounce */
@@ -101,6 +103,7 @@ struct sim_mechanics {
 void sim_platform_init(struct sim_mechanics *mechanics);
 void sim_platform_step(struct sim_mechanics *mechanics, bool forward);
 void sim_platform_advance(struct sim_mechanics *mechanics, uint64_t to);
+void sim_platform_carry(struct sim_mechanics *mechanics, double place); /* an industrial drive has, to there */
 /* After an output, the driver, the supply or the string changed. */
 void sim_platform_powers(struct sim_mechanics *mechanics);
 double sim_platform_place(const struct sim_mechanics *mechanics); /* of the body, microsteps */

@@ -151,6 +151,19 @@ void sim_platform_step(struct sim_mechanics *m, bool forward)
     seat_follows(m);
 }
 
+void sim_platform_carry(struct sim_mechanics *m, double place)
+{
+    struct sim_platform *p = &m->platform;
+    double by = place - p->seat;
+
+    if (by == 0)
+        return;
+    p->field = p->seat = place;
+    p->body = (struct sim_oscillator){0, 0}; /* held by a servo */
+    sim_oscillator_jump(&p->sway, by, p->omega_sway, m->options.sway_damping);
+    pay_out(m, place);
+}
+
 /* Share of the holding torque that is left at the present step rate. */
 static double torque_left(const struct sim_mechanics *m)
 {
@@ -242,7 +255,7 @@ void sim_platform_powers(struct sim_mechanics *m)
          open = m->outputs[BOARD_OUT_BRAKE] && m->supply > SUPPLY_LOCKOUT;
     bool energised = m->outputs[BOARD_OUT_ENABLE] && !m->driver_fault && m->supply > SUPPLY_LOCKOUT;
 
-    if (energised && !p->energised) {
+    if (energised && !p->energised && m->truth.control.motion.drive == LUMI_RIG_DRIVE_STEPPER) {
         /* The rotor takes the nearest place of rest of a field that stands where the pulses left it. */
         double cycle = 4 * full_step(m), phase = m->options.start_turns * p->steps_per_turn + (double)p->count;
         double field = phase + cycle * round((p->seat - phase) / cycle), by = field - p->seat;

@@ -68,6 +68,8 @@ static bool contact_of(struct sim_mechanics *m, enum board_input input)
         return string_contact(m, input);
     case BOARD_IN_DRIVER_FAULT:
         return m->driver_fault;
+    case BOARD_IN_REACHED:
+        return m->reached;
     default:
         return false;
     }
@@ -97,7 +99,7 @@ static void change(struct sim_mechanics *m, enum board_input input, bool active,
     m->edge_count = kept;
     m->contact[input] = active;
     schedule(m, input, active, at);
-    if (input == BOARD_IN_DRIVER_FAULT || bounce == 0)
+    if (input == BOARD_IN_DRIVER_FAULT || input == BOARD_IN_REACHED || bounce == 0) /* no contacts */
         return;
     int pairs = (int)(sim_random(seed, n, CHANNEL_BOUNCE) % 4);
     uint64_t t = at;
