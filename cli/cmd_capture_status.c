@@ -52,8 +52,9 @@ static void print_rig(JsonObject *rig, bool estop)
     if (strcmp(cli_json_text(rig, "link"), "open"))
         printf("rig       no board (%s): %s\n", cli_json_text(rig, "link"), cli_json_text(rig, "text"));
     else
-        printf("rig       %s at %s, firmware %s; faults: %s\n", cli_json_text(rig, "state"),
-               cli_json_text(rig, "address"), cli_json_text(rig, "firmware"), faults->len ? faults->str : "none");
+        printf("rig       %s%s at %s, firmware %s; faults: %s\n", cli_json_text(rig, "state"),
+               cli_json_bool(rig, "position_known") ? "" : " (not homed)", cli_json_text(rig, "address"),
+               cli_json_text(rig, "firmware"), faults->len ? faults->str : "none");
     if (estop)
         puts("rig       EMERGENCY STOP is pressed");
 }

@@ -109,6 +109,8 @@ int lumi_engine_missing(const struct lumi_engine *e, struct lumi_engine_missing 
         const struct engine_frame *frame = e->frames + i;
         if (frame->at == AT_NONE || frame->at == AT_STORED || frame->at == AT_ACCEPTED)
             continue;
+        if (frame->at < AT_REJECTED && !frame->reason && engine_taking(e)) /* its turn is to come */
+            continue;
         if (count < max) {
             struct lumi_engine_missing *entry = list + count;
             snprintf(entry->frame, sizeof entry->frame, "%s", e->names[i]);

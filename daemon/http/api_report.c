@@ -76,7 +76,8 @@ static void put_camera(JsonBuilder *builder, const struct lumi_engine_camera_sta
     lumi_api_put_double(builder, "gain", camera->status.gain);
     lumi_api_put_double(builder, "temperature", camera->status.temperature);
     lumi_api_put_double(builder, "battery", camera->status.battery);
-    lumi_api_put_int(builder, "card_free_bytes", camera->status.card_free_bytes);
+    const int64_t card = camera->status.card_free_bytes;
+    lumi_api_put_double(builder, "card_free_bytes", card < 0 ? NAN : (double)card);
     lumi_api_put_int(builder, "frames", (int64_t)camera->status.frames);
     lumi_api_put_int(builder, "frames_dropped", (int64_t)camera->status.dropped);
     lumi_api_put_int(builder, "frames_damaged", (int64_t)camera->status.damaged);

@@ -171,6 +171,8 @@ const char *safety_clear(struct core *core, uint32_t faults)
 
     if (faults != s->standing)
         return s->standing == 0 ? "no fault stands" : "name the faults that stand, all of them";
+    if (faults == 0)
+        return NULL;
     if (!state_at_rest(core->state))
         return "the rig has not come to rest yet";
     for (int i = 0; i < LUMI_RIG_FAULTS; i++)

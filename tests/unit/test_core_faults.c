@@ -424,6 +424,25 @@ static void a_stop_in_mid_homing_loses_the_position(void **state)
     bench_destroy(b);
 }
 
+static void clearing_where_nothing_stands_changes_nothing(void **state)
+{
+    struct lumi_rig rig;
+
+    (void)state;
+    assert_int_equal(lumi_rig_builtin("arc16", &rig, NULL), LUMI_OK);
+    struct bench *b = bench_create(&rig);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, 0)), lumi_wire_Result_DONE);
+    assert_int_equal(b->core->state, lumi_wire_State_LOST);
+    bench_home(b);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, 0)), lumi_wire_Result_DONE);
+    bench_run(b, 1);
+    assert_int_equal(b->core->state, lumi_wire_State_IDLE);
+    assert_int_equal(b->faults_set, 0);
+    assert_int_equal(bench_ask(b, BENCH_REQUEST(clear, .faults = 1)), lumi_wire_Result_REFUSED);
+    assert_string_equal(b->reply.text, "no fault stands");
+    bench_destroy(b);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -442,6 +461,7 @@ int main(void)
         cmocka_unit_test(a_main_loop_that_comes_too_late_is_an_internal_fault),
         cmocka_unit_test(a_fault_at_rest_keeps_the_position),
         cmocka_unit_test(a_stop_in_mid_homing_loses_the_position),
+        cmocka_unit_test(clearing_where_nothing_stands_changes_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
