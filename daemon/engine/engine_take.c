@@ -89,9 +89,10 @@ static bool ask_home(struct lumi_engine *e)
     lumi_wire_Request request = {.which_command = lumi_wire_Request_home_tag};
 
     if (!e->rig.string.held && e->rig.turns > 1 && !e->config.wind_up && !e->fresh) {
-        engine_interrupt(e, false,
-                         "nobody knows in which turn of its string the rig is: home it (lumi rig home --turn N, or "
-                         "--wind-up), then resume");
+        engine_interrupt(
+            e, false,
+            "nobody knows in which turn of its string the rig is: end lumid, home it (lumi rig home --turn N, "
+            "or --wind-up), start lumid again");
         return true;
     }
     request.command.home.wind_up = e->config.wind_up && !e->rig.string.held;

@@ -3,13 +3,19 @@
 
 #include <string.h>
 
+/* libsoup has no words for what is newer than RFC 7231. */
+static const char *phrase(unsigned status)
+{
+    return status == 421 ? "Misdirected Request" : soup_status_get_phrase(status);
+}
+
 void lumi_api_answer(SoupServerMessage *message, unsigned status, const char *type, char *text)
 {
     SoupMessageHeaders *headers = soup_server_message_get_response_headers(message);
 
     soup_message_headers_replace(headers, "Cache-Control", "no-store");
     soup_message_headers_replace(headers, "X-Content-Type-Options", "nosniff");
-    soup_server_message_set_status(message, status, NULL);
+    soup_server_message_set_status(message, status, phrase(status));
     soup_server_message_set_response(message, type, SOUP_MEMORY_TAKE, text, strlen(text));
 }
 
@@ -25,7 +31,7 @@ char *lumi_api_problem_text(unsigned status, const char *word, const char *detai
 
     json_builder_begin_object(builder);
     lumi_api_put_text(builder, "type", type);
-    lumi_api_put_text(builder, "title", soup_status_get_phrase(status));
+    lumi_api_put_text(builder, "title", phrase(status));
     lumi_api_put_int(builder, "status", status);
     lumi_api_put_text(builder, "detail", detail);
     json_builder_end_object(builder);
@@ -38,7 +44,7 @@ char *lumi_api_problem_message(unsigned status, const char *word, const char *de
 
     return g_strdup_printf("HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nContent-Length: "
                            "%zu\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n%s",
-                           status, soup_status_get_phrase(status), strlen(document), document);
+                           status, phrase(status), strlen(document), document);
 }
 
 void lumi_api_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail)

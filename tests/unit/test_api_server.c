@@ -143,7 +143,8 @@ static void a_foreign_page_is_refused(void **state)
     };
 
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        expect(fixture_ask(*state, "GET", "/api/v1/status", bad[i], NULL), 421, "urn:lumid:host");
+        expect(fixture_ask(*state, "GET", "/api/v1/status", bad[i], NULL), 421,
+               "urn:lumid:host\",\"title\":\"Misdirected Request\"");
     expect(fixture_ask(*state, "POST", "/api/v1/capture/pause", "Origin: https://evil.example\r\n", NULL), 403,
            "urn:lumid:origin");
     expect(fixture_ask(*state, "POST", "/api/v1/capture/pause", "Origin: null\r\n", NULL), 403, NULL);
