@@ -26,6 +26,7 @@ finish() {
     rm -rf "$work"
 }
 trap finish EXIT
+trap 'exit 1' INT TERM
 (
     flock 9
     "$here/vm/build.sh" "$cache"
