@@ -25,6 +25,10 @@ host_again() {
     if [ -z "$1" ]; then
         return 0
     fi
+    [ "$cuts" -ge "$wanted" ] || {
+        echo "only $cuts of $wanted power cuts came before it was done"
+        status=1
+    }
     [ -s "$work/acknowledged" ] || {
         echo "$cuts power cuts"
         return 1
