@@ -311,6 +311,8 @@ void world_destroy(struct world *w)
         world_daemon_stop(w);
     if (w->frames_out)
         world_wrong(w, "%d frames were never released", w->frames_out);
+    if (w->waiting_most > w->options.store_memory)
+        world_wrong(w, "%zu bytes waited to be written, and %zu are allowed", w->waiting_most, w->options.store_memory);
     world_board_destroy(w);
     world_cameras_destroy(w);
     if (w->own_folder)

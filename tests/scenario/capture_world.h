@@ -226,6 +226,8 @@ void world_board_destroy(struct world *world);
 void world_board_restart_host(struct world *world); /* another program with another client */
 void world_board_service(struct world *world);
 int64_t world_board_next(const struct world *world);
+/* What the world itself keeps of every step and exposure since it began. */
+size_t world_records_bytes(const struct world *world);
 void world_board_request(struct world *world, uint32_t number, bool profile, const lumi_wire_Request *request);
 
 /* Cameras: world_cameras.c */

@@ -343,3 +343,25 @@ int64_t world_board_next(const struct world *w)
         next = w->requests[0].deadline_ns;
     return next;
 }
+
+/* ---- what is remembered ---- */
+
+/* As an array grows: to the next power of two. */
+static size_t grown(size_t bytes)
+{
+    size_t room = 16;
+
+    while (room < bytes)
+        room *= 2;
+    return room;
+}
+
+size_t world_records_bytes(const struct world *w)
+{
+    const struct sim_machine *m = w->machine;
+    int count;
+
+    sim_mechanics_exposures(sim_machine_mechanics(w->machine), &count);
+    return (size_t)w->exposure_room * sizeof *w->exposures + grown((size_t)count * sizeof(struct sim_exposure)) +
+           grown(m->steps->len * sizeof(uint64_t)) + grown(m->events->len * sizeof(struct sim_machine_event));
+}

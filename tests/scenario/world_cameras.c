@@ -441,12 +441,9 @@ void world_judge(struct world *w, const struct lumi_engine_judge_job *job)
     e->numbers = (struct lumi_judge_numbers){
         .sharpness = 0.5, .blur_pixels = 0.3, .clipped = 0.01, .dark = 0.01, .mean = 0.4, .shift_pixels = NAN};
     e->numbers.exposure_stops = job->neighbour_count > 0 ? 0 : NAN;
+    /* It sees blur, nothing else: damage and wrong exposures are the engine's to find, by what the camera says. */
     if (truth.flaws & WORLD_BLURRED)
         e->numbers.blur_pixels = 9;
-    if (truth.flaws & WORLD_WRONG_EXPOSURE)
-        e->numbers.exposure_stops = 2;
-    if (truth.flaws & WORLD_DAMAGED)
-        e->code = LUMI_ERR_FORMAT;
 }
 
 static void judged(struct world *w, struct world_event *e)
