@@ -81,9 +81,13 @@ static void came(struct lumi_engine *e, int camera, const struct lumi_camera_not
     c->there = true;
     c->given_up = false;
     c->identity = notice->identity;
-    c->trusted = false;
-    if (c->match)
+    c->trusted = c->doubtful = false;
+    if (c->match) {
+        struct lumi_match_options options; /* whether it has a clock is known only now */
+        engine_match_options(e, camera, &options);
+        lumi_match_change(c->match, &options);
         lumi_match_restart(c->match);
+    }
 }
 
 static void gone(struct lumi_engine *e, int camera, const struct lumi_camera_notice *notice)

@@ -171,6 +171,11 @@ static void take_hit(struct lumi_engine *e, int camera, const struct lumi_match_
         engine_held_drop(held);
         return;
     }
+    if (c->doubtful) {
+        engine_frame_lost(e, result->shot, camera, "whether this frame is its own is not known: no test was answered");
+        engine_held_drop(held);
+        return;
+    }
     if (held->frame->damaged) {
         engine_incident(e, camera, "damaged", "the frame of shot %d from %s came damaged", result->shot, name);
         engine_frame_lost(e, result->shot, camera, "it came damaged: %u packets are missing",

@@ -156,6 +156,7 @@ struct engine_camera {
     struct engine_test_answer answers[ENGINE_ANSWERS];
     int answer_count;
     bool trusted;    /* where its clock or count stands is known */
+    bool doubtful;   /* it did not answer the last test as it should: of no frame of it is the shot known */
     uint32_t misses; /* frames that never came, and frames of no shot, since */
     bool edge_seen;  /* of its sync line, in the test */
     size_t frame_bytes;

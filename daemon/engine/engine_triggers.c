@@ -54,6 +54,7 @@ static void note_answer(struct lumi_engine *e, int camera, const struct lumi_cam
     for (int i = 0; i < c->answer_count && !c->trusted; i++)
         if (confirms(c, &c->answers[i], &answer)) {
             c->trusted = true;
+            c->doubtful = false;
             c->misses = 0;
             lumi_match_prior(c->match, &answer.frame, exposed);
         }
@@ -272,9 +273,11 @@ static bool answered(struct lumi_engine *e)
     }
     if (e->stage == STAGE_TRIGGERS)
         tell_seen(e, e->test_camera);
-    else if (!c->trusted)
+    else if (!c->trusted) {
+        e->cameras[e->test_camera].doubtful = true;
         engine_incident(e, e->test_camera, "test", "%s does not answer its test trigger as it should",
                         e->config.cameras[e->test_camera].name);
+    }
     return true;
 }
 

@@ -43,10 +43,15 @@ void lumi_match_destroy(struct lumi_match *match)
     lumi_free(match);
 }
 
-void lumi_match_sweep(struct lumi_match *match, const struct lumi_match_options *options)
+void lumi_match_change(struct lumi_match *match, const struct lumi_match_options *options)
 {
     match->options = *options;
     match->period = options->period > 0 && match->period > 0 ? match->period : options->period;
+}
+
+void lumi_match_sweep(struct lumi_match *match, const struct lumi_match_options *options)
+{
+    lumi_match_change(match, options);
     match->counts = (struct lumi_match_clock){0};
     match->residual_sum = 0;
     match->residual_count = 0;

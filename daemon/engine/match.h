@@ -81,6 +81,8 @@ void lumi_match_destroy(struct lumi_match *match); /* NULL is fine; frames that 
 void lumi_match_sweep(struct lumi_match *match, const struct lumi_match_options *options);
 /* A frame of a test whose time is known to some milliseconds: where the clock stands, and the usual delay. */
 void lumi_match_prior(struct lumi_match *match, const struct lumi_match_frame *frame, int64_t exposed_ns);
+/* What holds from now on; all that is known stays. */
+void lumi_match_change(struct lumi_match *match, const struct lumi_match_options *options);
 /* The camera was away: its clock and its count have begun anew. */
 void lumi_match_restart(struct lumi_match *match);
 
