@@ -220,6 +220,24 @@ static void what_is_wrong_with_a_frame_is_found_and_named(void **state)
     }
 }
 
+/* The first frames come late and the next triggers are not seen: without what the test shots have said of the camera's
+ * clock they would fit the shots behind their own. */
+static void the_test_shots_tell_of_which_shots_the_first_frames_are(void **state)
+{
+    struct day *d = day_create(2, 8);
+
+    (void)state;
+    d->script.count = 2;
+    d->script.faults[0] = (struct world_fault){
+        .kind = WORLD_FAULT_LATE, .shot = -1, .at = 6, .camera = 1, .count = 2, .value = 1.85, .duration = 9};
+    d->script.faults[1] =
+        (struct world_fault){.kind = WORLD_FAULT_VANISH, .shot = 1, .at = 0.04, .camera = 1, .count = 2, .duration = 5};
+    day_run(d, "the first frames late");
+    assert_int_equal(d->account.retaken, 2);
+    assert_true(named(d, "late"));
+    day_destroy(d);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -229,6 +247,7 @@ int main(void)
         cmocka_unit_test(a_bracket_has_the_exposures_of_the_plan),
         cmocka_unit_test(a_rig_on_its_string_goes_round_twice),
         cmocka_unit_test(what_is_wrong_with_a_frame_is_found_and_named),
+        cmocka_unit_test(the_test_shots_tell_of_which_shots_the_first_frames_are),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

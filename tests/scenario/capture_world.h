@@ -28,6 +28,7 @@ struct world_exposure {
     int camera;
     int shot; /* the plan's number; −1: a test, or nobody's */
     int64_t begin_ns;
+    double exposure_s; /* as long as it was */
     unsigned flaws;
     bool taken;     /* the camera was armed and made a frame of it */
     bool delivered; /* and the engine was given it */

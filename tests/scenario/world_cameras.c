@@ -129,10 +129,8 @@ static void add_frame(struct world *w, int camera, int record, unsigned flaws, i
     e->frame.sequence = c->sequence;
     e->frame.gap = c->gap;
     e->frame.device_ns = device_time(w, c, begin_ns);
-    e->frame.exposure_s = c->exposure_s;
+    e->frame.exposure_s = record >= 0 ? w->exposures[record].exposure_s : c->exposure_s;
     e->frame.gain = c->gain;
-    if (flaws & WORLD_WRONG_EXPOSURE && record >= 0)
-        e->frame.exposure_s = c->exposure_s * 4;
     c->gap = 0;
 }
 
@@ -170,9 +168,8 @@ static void take_frame(struct world *w, int record)
         x->flaws |= WORLD_BLURRED;
     if (used(&c->damage))
         x->flaws |= WORLD_DAMAGED;
-    if (used(&c->wrong_exposure))
-        x->flaws |= WORLD_WRONG_EXPOSURE;
-    if (fabs(c->exposure_s / wanted - 1) > 0.05)
+    x->exposure_s = c->exposure_s * (used(&c->wrong_exposure) ? 4 : 1);
+    if (fabs(x->exposure_s / wanted - 1) > 0.05)
         x->flaws |= WORLD_WRONG_EXPOSURE;
     if (used(&c->drop) || c->out >= buffers) {
         c->dropped++;
