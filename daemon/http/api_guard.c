@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include <glib-unix.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #define SECOND 1000000000LL
@@ -27,6 +28,7 @@ struct connection {
     guint8 peer[16];
     gsize peer_size; /* 0: unknown */
     bool here;       /* this computer */
+    bool waiting;    /* for a request: nothing is being answered */
     int64_t until_ns;
 };
 
@@ -76,6 +78,15 @@ static bool is_same_peer(const struct connection *a, const struct connection *b)
     return a->peer_size && a->peer_size == b->peer_size && !memcmp(a->peer, b->peer, a->peer_size);
 }
 
+/* libsoup 3.2 looks at a connection that waits for its next request only when something is read of it: of those that
+ * the peer has closed it keeps the descriptor. */
+static bool has_left(const struct connection *connection)
+{
+    char byte;
+
+    return connection->waiting && recv(g_socket_get_fd(connection->socket), &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+}
+
 /* Others leave one peer's share to this computer: its operator gets through whatever they do. */
 static bool is_one_too_many(const struct connection *made)
 {
@@ -87,7 +98,7 @@ static bool is_one_too_many(const struct connection *made)
     g_hash_table_iter_init(&at, made->guard->connections);
     while (g_hash_table_iter_next(&at, NULL, &value)) {
         const struct connection *connection = value;
-        if (g_socket_is_closed(connection->socket))
+        if (g_socket_is_closed(connection->socket) || has_left(connection))
             continue;
         all++;
         others += !connection->here;
@@ -127,7 +138,7 @@ static gboolean on_tick(void *context)
     g_hash_table_iter_init(&at, guard->connections);
     while (g_hash_table_iter_next(&at, NULL, &value)) {
         struct connection *connection = value;
-        if (time > connection->until_ns) {
+        if (time > connection->until_ns || (connection->until_ns != INT64_MAX && has_left(connection))) {
             g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
             connection->until_ns = INT64_MAX;
         }
@@ -135,13 +146,15 @@ static gboolean on_tick(void *context)
     return G_SOURCE_CONTINUE;
 }
 
-static void set_limit(struct lumi_api_guard *guard, SoupServerMessage *message, int64_t until_ns)
+static void set_limit(struct lumi_api_guard *guard, SoupServerMessage *message, int64_t until_ns, bool waiting)
 {
     GSocket *socket = soup_server_message_get_socket(message);
     struct connection *connection = socket ? g_hash_table_lookup(guard->connections, socket) : NULL;
 
-    if (connection)
+    if (connection) {
         connection->until_ns = until_ns;
+        connection->waiting = waiting;
+    }
 }
 
 static void on_started(SoupServer *server, SoupServerMessage *message, void *context)
@@ -154,11 +167,12 @@ static void on_started(SoupServer *server, SoupServerMessage *message, void *con
     if (!socket)
         return;
     if (g_hash_table_contains(guard->connections, socket)) {
-        set_limit(guard, message, now(guard) + REQUEST_NS);
+        set_limit(guard, message, now(guard) + REQUEST_NS, true);
         return;
     }
     made = g_new0(struct connection, 1);
-    *made = (struct connection){.guard = guard, .socket = socket, .until_ns = now(guard) + REQUEST_NS};
+    *made = (struct connection){.guard = guard, .socket = socket, .waiting = true};
+    made->until_ns = now(guard) + REQUEST_NS;
     identify(made);
     g_hash_table_insert(guard->connections, socket, made);
     g_object_weak_ref(G_OBJECT(socket), on_gone, guard);
@@ -173,7 +187,7 @@ static void on_read(SoupServer *server, SoupServerMessage *message, void *contex
     struct lumi_api_guard *guard = context;
 
     (void)server;
-    set_limit(guard, message, now(guard) + ANSWER_NS);
+    set_limit(guard, message, now(guard) + ANSWER_NS, false);
 }
 
 static void on_finished(SoupServer *server, SoupServerMessage *message, void *context)
@@ -181,12 +195,12 @@ static void on_finished(SoupServer *server, SoupServerMessage *message, void *co
     struct lumi_api_guard *guard = context;
 
     (void)server;
-    set_limit(guard, message, now(guard) + REQUEST_NS);
+    set_limit(guard, message, now(guard) + REQUEST_NS, true);
 }
 
 void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *message)
 {
-    set_limit(guard, message, INT64_MAX);
+    set_limit(guard, message, INT64_MAX, false);
 }
 
 /* ---- listening goes on ---- */

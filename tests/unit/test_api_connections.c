@@ -122,6 +122,16 @@ static void all_connections_are_bounded_and_a_closed_one_makes_room(void **state
             close(fds[i]);
 }
 
+static void who_was_answered_and_has_left_makes_room(void **state)
+{
+    for (int i = 0; i < 4 * PEER; i++) { /* a script that asks often, a connection each time */
+        int fd = connect_as(*state, 2);
+        ask_on(fd, "/api/v1/capture");
+        expect_answer(fd, 200);
+        close(fd);
+    }
+}
+
 static void who_says_nothing_is_hung_up_on(void **state)
 {
     static const char part[] = "GET /api/v1/capture HTTP/1.1\r\nHost: loc";
@@ -191,11 +201,9 @@ int main(void)
 {
 #define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
     const struct CMUnitTest tests[] = {
-        CASE(one_peer_has_a_share_of_the_connections),
-        CASE(all_connections_are_bounded_and_a_closed_one_makes_room),
-        CASE(who_says_nothing_is_hung_up_on),
-        CASE(who_listens_to_events_may_be_silent),
-        CASE(listening_goes_on_after_the_descriptors_had_run_out),
+        CASE(one_peer_has_a_share_of_the_connections),  CASE(all_connections_are_bounded_and_a_closed_one_makes_room),
+        CASE(who_was_answered_and_has_left_makes_room), CASE(who_says_nothing_is_hung_up_on),
+        CASE(who_listens_to_events_may_be_silent),      CASE(listening_goes_on_after_the_descriptors_had_run_out),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
