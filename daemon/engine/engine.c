@@ -20,20 +20,6 @@ static const engine_stage_fn stages[ENGINE_STAGES] = {
     [STAGE_SEAL] = engine_stage_seal,       [STAGE_CLOSE] = engine_stage_close,
 };
 
-void lumi_engine_config_init(struct lumi_engine_config *config)
-{
-    *config = (struct lumi_engine_config){.judging = true,
-                                          .retakes = 3,
-                                          .frame_patience = 5,
-                                          .disk_reserve = 0.05,
-                                          .battery_least = 0.2,
-                                          .temperature_most = 70,
-                                          .rig_patience = 60,
-                                          .verify = true};
-    lumi_judge_limits_init(&config->judge);
-    lumi_store_options_init(&config->store);
-}
-
 int lumi_engine_create(const struct lumi_engine_config *config, const struct lumi_engine_ports *ports, int64_t now_ns,
                        struct lumi_engine **engine, struct lumi_error *error)
 {

@@ -63,7 +63,7 @@ void engine_camera_reset(struct lumi_engine *e, int camera)
             }
             c->pictures[i] = NULL;
         }
-    c->sharp_count = 0;
+    c->usual.count = 0;
     c->unseen = c->wrong_exposure = 0;
     c->surplus = 0;
 }

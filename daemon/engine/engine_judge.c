@@ -159,25 +159,6 @@ void engine_judge_due(struct lumi_engine *e)
     }
 }
 
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-
-    return (x > y) - (x < y);
-}
-
-static double usual_sharpness(const struct engine_camera *c)
-{
-    float sorted[ENGINE_SHARP];
-    int count = c->sharp_count < ENGINE_SHARP ? c->sharp_count : ENGINE_SHARP;
-
-    if (count < 3)
-        return 0;
-    memcpy(sorted, c->sharp, (size_t)count * sizeof *sorted);
-    qsort(sorted, (size_t)count, sizeof *sorted, by_value);
-    return (double)sorted[count / 2];
-}
-
 static void keep_picture(struct engine_camera *c, const struct engine_judging *job, struct lumi_judge_picture *picture)
 {
     struct engine_picture *kept = lumi_calloc(1, sizeof *kept);
@@ -250,9 +231,10 @@ static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int 
                         e->config.cameras[job->camera].name, text ? text : "");
         return;
     }
-    accepted = lumi_judge_verdict(numbers, &e->config.judge, usual_sharpness(c), reason, sizeof reason);
-    if (accepted && numbers->sharpness > 0)
-        c->sharp[c->sharp_count++ % ENGINE_SHARP] = (float)numbers->sharpness;
+    accepted =
+        lumi_judge_verdict(numbers, &e->config.judge, lumi_judge_usual_sharpness(&c->usual), reason, sizeof reason);
+    if (accepted)
+        lumi_judge_usual_add(&c->usual, numbers->sharpness);
     write_verdict(e, job, accepted, numbers, reason);
 }
 

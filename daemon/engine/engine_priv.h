@@ -23,7 +23,6 @@
 #define ENGINE_NS 1000000000LL
 #define ENGINE_EVENTS_MAX 16384 /* of the board that wait to be acknowledged */
 #define ENGINE_PICTURES 3       /* of a camera that are kept for judging its neighbours */
-#define ENGINE_SHARP 31         /* accepted frames of a camera whose sharpness is remembered */
 #define ENGINE_TRIES 4          /* beginnings without a new frame until somebody has to look */
 
 enum engine_stage {
@@ -162,8 +161,7 @@ struct engine_camera {
     size_t frame_bytes;
     struct engine_held *test;
     struct engine_picture *pictures[ENGINE_PICTURES];
-    float sharp[ENGINE_SHARP];
-    int sharp_count;
+    struct lumi_judge_usual usual;
     uint32_t unseen, wrong_exposure; /* told of: the first few by name, then counted */
     uint64_t surplus;                /* beside the matcher's: frames that were good already */
 };

@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define NOISE_BLOCK 8
 #define NOT_FOUND 0.6 /* of what neighbours should see: more is no thing that moved, and no shift can be told */
@@ -169,6 +170,26 @@ static void say(struct line *line, const char *format, ...)
     int length = vsnprintf(line->text + line->at, line->size - line->at, format, args);
     va_end(args);
     line->at += length > 0 ? (size_t)length : 0;
+}
+
+#define USUAL ((int)(sizeof((struct lumi_judge_usual *)0)->sharpness / sizeof(float)))
+
+void lumi_judge_usual_add(struct lumi_judge_usual *usual, double sharpness)
+{
+    if (sharpness > 0)
+        usual->sharpness[usual->count++ % USUAL] = (float)sharpness;
+}
+
+double lumi_judge_usual_sharpness(const struct lumi_judge_usual *usual)
+{
+    float sorted[USUAL];
+    const int count = usual->count < USUAL ? usual->count : USUAL;
+
+    if (count < 3)
+        return 0;
+    memcpy(sorted, usual->sharpness, (size_t)count * sizeof *sorted);
+    qsort(sorted, (size_t)count, sizeof *sorted, by_value);
+    return (double)sorted[count / 2];
 }
 
 bool lumi_judge_verdict(const struct lumi_judge_numbers *n, const struct lumi_judge_limits *limits,

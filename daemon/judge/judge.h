@@ -51,8 +51,15 @@ int lumi_judge_measure(const struct lumi_judge_picture *picture, const struct lu
                        const struct lumi_pose *pose, double exposure_s, double gain,
                        const struct lumi_judge_neighbour *neighbours, int count, struct lumi_judge_numbers *numbers,
                        struct lumi_error *error);
-/* Whether it is accepted; `reason` (one line, "" where there is nothing to say) also holds warnings. `usual_sharpness`:
- * the median of the camera's accepted frames, 0 where there are none yet. */
+/* What a camera's frames usually have: the sharpness of its latest accepted ones. All zero is a new one. */
+struct lumi_judge_usual {
+    float sharpness[31];
+    int count; /* ever */
+};
+void lumi_judge_usual_add(struct lumi_judge_usual *usual, double sharpness); /* 0, unknown, counts for nothing */
+double lumi_judge_usual_sharpness(const struct lumi_judge_usual *usual);     /* their median; 0: less than three */
+
+/* Whether it is accepted; `reason` (one line, "" where there is nothing to say) also holds warnings. */
 bool lumi_judge_verdict(const struct lumi_judge_numbers *numbers, const struct lumi_judge_limits *limits,
                         double usual_sharpness, char *reason, size_t size);
 

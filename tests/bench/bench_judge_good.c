@@ -10,7 +10,6 @@
 #include <stdio.h>
 
 #define CAMERAS 32
-#define USUAL 31 /* frames of a camera whose sharpness makes the usual one */
 
 struct view {
     struct lumi_judge_picture *picture;
@@ -19,8 +18,7 @@ struct view {
 
 struct camera {
     struct view last[3]; /* newest first */
-    float sharp[USUAL];
-    int sharp_count;
+    struct lumi_judge_usual usual;
 };
 
 struct tally {
@@ -30,25 +28,6 @@ struct tally {
 static bool talkative, smears = true;
 static const double lengths[] = {2, 3, 4, 6, 10, 20};
 #define LENGTHS ((int)(sizeof lengths / sizeof *lengths))
-
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-
-    return (x > y) - (x < y);
-}
-
-static double usual_sharpness(const struct camera *c)
-{
-    float sorted[USUAL];
-    int count = c->sharp_count < USUAL ? c->sharp_count : USUAL;
-
-    if (count < 3)
-        return 0;
-    memcpy(sorted, c->sharp, (size_t)count * sizeof *sorted);
-    qsort(sorted, (size_t)count, sizeof *sorted, by_value);
-    return (double)sorted[count / 2];
-}
 
 static void add(const struct view *view, struct lumi_judge_neighbour *neighbours, int *count)
 {
@@ -84,13 +63,13 @@ static void judge_good(struct camera *cameras, int camera, const struct lumi_ras
     if (camera + 1 < CAMERAS)
         add(&cameras[camera + 1].last[0], neighbours, &count);
     lumi_judge_measure(picture, &frame->lens, &frame->pose, 0.01, 1, neighbours, count, &n, NULL);
-    double usual = usual_sharpness(&cameras[camera]);
+    double usual = lumi_judge_usual_sharpness(&cameras[camera].usual);
     bool good = lumi_judge_verdict(&n, &limits, usual, reason, sizeof reason);
     tally->frames++;
     tally->rejected += !good;
     tally->warned += good && reason[0];
-    if (good && n.sharpness > 0)
-        cameras[camera].sharp[cameras[camera].sharp_count++ % USUAL] = (float)n.sharpness;
+    if (good)
+        lumi_judge_usual_add(&cameras[camera].usual, n.sharpness);
     if (talkative || !good)
         printf("  %s good: %s sharp %.3f of %.3f best %.1f at %.0f explained %.3f depth %.2f (%.2f %.2f %.2f %.2f) "
                "shift %.1f moved %.2f "

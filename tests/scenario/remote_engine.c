@@ -248,20 +248,6 @@ int64_t lumi_engine_next(const struct lumi_engine *engine)
     return e->next_ns;
 }
 
-void lumi_engine_config_init(struct lumi_engine_config *config)
-{
-    *config = (struct lumi_engine_config){.judging = true,
-                                          .retakes = 3,
-                                          .frame_patience = 5,
-                                          .disk_reserve = 0.05,
-                                          .battery_least = 0.2,
-                                          .temperature_most = 70,
-                                          .rig_patience = 60,
-                                          .verify = true};
-    lumi_judge_limits_init(&config->judge);
-    lumi_store_options_init(&config->store);
-}
-
 const char *lumi_engine_state_name(enum lumi_engine_state state)
 {
     return state == LUMI_ENGINE_DONE ? "done" : "under way";
