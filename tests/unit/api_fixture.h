@@ -60,6 +60,28 @@ static inline void turn_the_loop(void)
         continue;
 }
 
+/* As CMocka's set-up and tear-down. */
+static inline int fixture_set_up(void **state)
+{
+    struct fixture *fixture = calloc(1, sizeof *fixture);
+
+    fixture_time = 0;
+    fixture_options(fixture);
+    fixture_start(fixture);
+    *state = fixture;
+    return 0;
+}
+
+static inline int fixture_tear_down(void **state)
+{
+    struct fixture *fixture = *state;
+
+    lumi_http_stop(fixture->http);
+    turn_the_loop();
+    free(fixture);
+    return 0;
+}
+
 static inline int fixture_connect(const struct fixture *fixture)
 {
     struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)lumi_http_port(fixture->http))};

@@ -21,16 +21,6 @@ static int set_up(void **state)
     return 0;
 }
 
-static int tear_down(void **state)
-{
-    struct fixture *fixture = *state;
-
-    lumi_http_stop(fixture->http);
-    turn_the_loop();
-    free(fixture);
-    return 0;
-}
-
 /* As one of 127.0.0.N. */
 static int connect_as(const struct fixture *fixture, int n)
 {
@@ -199,7 +189,7 @@ static void listening_goes_on_after_the_descriptors_had_run_out(void **state)
 
 int main(void)
 {
-#define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+#define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, fixture_tear_down)
     const struct CMUnitTest tests[] = {
         CASE(one_peer_has_a_share_of_the_connections),  CASE(all_connections_are_bounded_and_a_closed_one_makes_room),
         CASE(who_was_answered_and_has_left_makes_room), CASE(who_says_nothing_is_hung_up_on),

@@ -10,7 +10,6 @@ static JsonObject *schemas, *paths;
 
 static int set_up(void **state)
 {
-    struct fixture *fixture = calloc(1, sizeof *fixture);
     JsonObject *root;
 
     parser = json_parser_new();
@@ -18,21 +17,13 @@ static int set_up(void **state)
     root = json_node_get_object(json_parser_get_root(parser));
     schemas = json_object_get_object_member(json_object_get_object_member(root, "components"), "schemas");
     paths = json_object_get_object_member(root, "paths");
-    fixture_options(fixture);
-    fixture_start(fixture);
-    *state = fixture;
-    return 0;
+    return fixture_set_up(state);
 }
 
 static int tear_down(void **state)
 {
-    struct fixture *fixture = *state;
-
-    lumi_http_stop(fixture->http);
-    turn_the_loop();
     g_object_unref(parser);
-    free(fixture);
-    return 0;
+    return fixture_tear_down(state);
 }
 
 static JsonObject *follow(JsonObject *schema)

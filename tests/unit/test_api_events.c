@@ -5,27 +5,6 @@
 
 #define FLOOD 12000 /* events, some 7 MB: more than the sockets between hold */
 
-static int set_up(void **state)
-{
-    struct fixture *fixture = calloc(1, sizeof *fixture);
-
-    fixture_time = 0;
-    fixture_options(fixture);
-    fixture_start(fixture);
-    *state = fixture;
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    struct fixture *fixture = *state;
-
-    lumi_http_stop(fixture->http);
-    turn_the_loop();
-    free(fixture);
-    return 0;
-}
-
 static void tell(struct fixture *fixture, const char *text)
 {
     struct lumi_engine_told told = {.kind = LUMI_TALE_INCIDENT, .camera = -1};
@@ -150,9 +129,9 @@ static void what_was_pushed_out_is_counted(void **state)
     close(fd);
 }
 
-static void who_sleeps_costs_nothing_and_is_told_what_it_missed(void **state)
+/* Somebody who listens and takes nothing of a flood. */
+static int listen_and_sleep(struct fixture *fixture)
 {
-    struct fixture *fixture = *state;
     GString *got;
     int fd = listen_from(fixture, NULL, "event: progress", &got);
     g_autofree char *long_text = g_strnfill(500, 'x');
@@ -163,6 +142,15 @@ static void who_sleeps_costs_nothing_and_is_told_what_it_missed(void **state)
         if (i % 100 == 0)
             turn_the_loop();
     }
+    return fd;
+}
+
+static void who_sleeps_costs_nothing_and_is_told_what_it_missed(void **state)
+{
+    struct fixture *fixture = *state;
+    GString *got;
+    int fd = listen_and_sleep(fixture);
+
     tell(fixture, "last");
     /* What the socket's buffers held comes first, then the gap, then the newest 2048. */
     got = fixture_receive(fd, "last");
@@ -178,16 +166,8 @@ static void who_sleeps_costs_nothing_and_is_told_what_it_missed(void **state)
 static void who_takes_nothing_for_a_minute_is_hung_up_on(void **state)
 {
     struct fixture *fixture = *state;
-    GString *got;
-    int fd = listen_from(fixture, NULL, "event: progress", &got);
-    g_autofree char *long_text = g_strnfill(500, 'x');
+    int fd = listen_and_sleep(fixture);
 
-    g_string_free(got, TRUE);
-    for (int i = 0; i < FLOOD; i++) {
-        tell(fixture, long_text);
-        if (i % 100 == 0)
-            turn_the_loop();
-    }
     fixture_time += 61 * 1000000000LL;
     for (int i = 0; i < 250; i++) /* until it is noticed: every half second */
         fixture_wait();
@@ -262,7 +242,7 @@ static void the_server_ends_while_somebody_listens(void **state)
 
 int main(void)
 {
-#define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+#define CASE(name) cmocka_unit_test_setup_teardown(name, fixture_set_up, fixture_tear_down)
     const struct CMUnitTest tests[] = {
         CASE(who_listens_is_told_what_happens_from_then_on),
         CASE(who_comes_back_gets_what_was_missed),

@@ -1,26 +1,6 @@
 /* daemon/http: routes, who may ask, limits. */
 #include "tests/unit/api_fixture.h"
 
-static int set_up(void **state)
-{
-    struct fixture *fixture = calloc(1, sizeof *fixture);
-
-    fixture_options(fixture);
-    fixture_start(fixture);
-    *state = fixture;
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    struct fixture *fixture = *state;
-
-    lumi_http_stop(fixture->http);
-    turn_the_loop();
-    free(fixture);
-    return 0;
-}
-
 static void expect(struct answer answer, int status, const char *part)
 {
     if (answer.status != status || (part && !strstr(answer.body, part)))
@@ -270,7 +250,7 @@ static void devices_are_looked_for_beside_the_loop(void **state)
 
 int main(void)
 {
-#define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+#define CASE(name) cmocka_unit_test_setup_teardown(name, fixture_set_up, fixture_tear_down)
     const struct CMUnitTest tests[] = {
         CASE(status_is_one_object),
         CASE(what_is_not_there_is_a_problem_document),

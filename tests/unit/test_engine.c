@@ -14,7 +14,21 @@
 /* after those */
 #include <cmocka.h>
 
-static void assert_sealed_whole(struct bench *b)
+static void start(struct bench *b)
+{
+    struct lumi_error error = {0};
+
+    assert_int_equal(bench_start(b, false, &error), LUMI_OK);
+}
+
+static void assert_complete(struct bench *b, double seconds)
+{
+    assert_true(bench_until(b, LUMI_ENGINE_DONE, seconds));
+    assert_true(bench_status(b)->complete);
+    assert_int_equal(b->frames_out, 0);
+}
+
+static void end_whole(struct bench *b)
 {
     struct lumi_verify_result result;
     struct lumi_error error = {0};
@@ -22,6 +36,7 @@ static void assert_sealed_whole(struct bench *b)
     assert_int_equal(lumi_capture_verify(b->status.capture, NULL, NULL, NULL, &result, &error), LUMI_OK);
     assert_true(result.sealed);
     assert_int_equal(result.problems, 0);
+    bench_end(b);
 }
 
 static unsigned bit(enum lumi_engine_state state)
@@ -32,13 +47,11 @@ static unsigned bit(enum lumi_engine_state state)
 static void a_sweep_ends_as_a_sealed_capture_with_every_frame(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
-    assert_true(bench_status(&b)->complete);
+    start(&b);
+    assert_complete(&b, 200);
     assert_int_equal(b.status.accepted, 8);
     assert_int_equal(b.status.missing, 0);
     assert_int_equal(b.starts, 1);
@@ -49,34 +62,27 @@ static void a_sweep_ends_as_a_sealed_capture_with_every_frame(void **state)
                                         bit(LUMI_ENGINE_SEALING) | bit(LUMI_ENGINE_DONE));
     assert_string_equal(b.handed, b.status.capture);
     assert_int_equal(b.stored, b.event_number); /* every event of the board was acknowledged */
-    assert_int_equal(b.frames_out, 0);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    end_whole(&b);
 }
 
 static void a_frame_that_never_comes_is_taken_again(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
     b.flaws[2][1] = BENCH_NO_FRAME;
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
-    assert_true(bench_status(&b)->complete);
+    start(&b);
+    assert_complete(&b, 200);
     assert_int_equal(b.status.round, 1);
     assert_int_equal(b.starts, 2);
     assert_int_equal(b.status.cameras[0].surplus, 1); /* its frame of that shot was good */
-    assert_int_equal(b.frames_out, 0);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    end_whole(&b);
 }
 
 static void late_doubled_damaged_and_wrongly_exposed_frames_are_found(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
@@ -84,45 +90,38 @@ static void late_doubled_damaged_and_wrongly_exposed_frames_are_found(void **sta
     b.flaws[1][1] = BENCH_LATE;
     b.flaws[2][0] = BENCH_DAMAGED;
     b.flaws[3][1] = BENCH_EXPOSURE;
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_DRAINING, 200));
     assert_int_equal(bench_status(&b)->cameras[0].doubled, 1);
     assert_int_equal(b.status.cameras[1].late, 1);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
-    assert_true(bench_status(&b)->complete);
+    assert_complete(&b, 200);
     assert_int_equal(b.status.round, 1);
-    assert_int_equal(b.frames_out, 0);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    end_whole(&b);
 }
 
 static void a_frame_that_is_judged_bad_is_taken_again(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_START_STOP, 1);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_SWEEPING, 100));
     b.verdict_rejects = 1;
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
-    assert_true(bench_status(&b)->complete);
+    assert_complete(&b, 200);
     assert_int_equal(b.status.accepted, 8);
     assert_int_equal(b.status.round, 1);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    end_whole(&b);
 }
 
 static void exchanged_trigger_wires_are_red_and_start_nothing(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
     b.exchanged = true;
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_RED, 100));
     assert_non_null(bench_check(&b, "trigger c00"));
     assert_int_equal(bench_check(&b, "trigger c00")->verdict, LUMI_RED);
@@ -134,12 +133,11 @@ static void exchanged_trigger_wires_are_red_and_start_nothing(void **state)
 static void a_test_frame_that_comes_once_more_is_not_the_next_trigger_s(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
     b.tests_twice = true;
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
     assert_int_equal(bench_check(&b, "trigger c01")->verdict, LUMI_GREEN);
     assert_true(bench_status(&b)->complete);
@@ -149,11 +147,10 @@ static void a_test_frame_that_comes_once_more_is_not_the_next_trigger_s(void **s
 static void exposures_of_a_bracket_are_told_to_the_cameras(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_START_STOP, 3);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_DONE, 400));
     assert_true(b.told_exposures >= 22); /* between each two of twelve shots, both */
     assert_true(bench_status(&b)->complete);
@@ -170,7 +167,7 @@ static void a_killed_program_goes_on_where_it_was(void **state)
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     while (bench_status(&b)->stored + b.status.accepted < 3)
         bench_run(&b, 0.01);
     bench_kill(&b);
@@ -178,30 +175,24 @@ static void a_killed_program_goes_on_where_it_was(void **state)
     bench_engine(&b);
     assert_int_equal(lumi_engine_recover(b.engine, b.now, &found, &error), LUMI_OK);
     assert_true(found);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
-    assert_true(bench_status(&b)->complete);
-    assert_int_equal(b.frames_out, 0);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    assert_complete(&b, 300);
+    end_whole(&b);
 }
 
 static void a_board_that_restarts_is_homed_and_told_what_is_done(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     while (bench_status(&b)->fired < 2)
         bench_run(&b, 0.01);
     bench_restart_board(&b);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
-    assert_true(bench_status(&b)->complete);
+    assert_complete(&b, 300);
     assert_int_equal(b.homes, 2);
     assert_int_equal(b.starts, 2);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    end_whole(&b);
 }
 
 static void nothing_goes_on_while_a_fault_stands(void **state)
@@ -212,7 +203,7 @@ static void nothing_goes_on_while_a_fault_stands(void **state)
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     while (bench_status(&b)->fired < 2)
         bench_run(&b, 0.01);
     bench_stand_still(&b);
@@ -228,30 +219,25 @@ static void nothing_goes_on_while_a_fault_stands(void **state)
     assert_int_equal(lumi_engine_clear(b.engine, b.now, &error), LUMI_OK);
     bench_run(&b, 2);
     assert_int_equal(lumi_engine_resume(b.engine, b.now, &error), LUMI_OK);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
-    assert_true(bench_status(&b)->complete);
+    assert_complete(&b, 300);
     bench_end(&b);
 }
 
 static void a_full_disk_loses_nothing(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_START_STOP, 1);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_SWEEPING, 100));
     b.disk_full = true;
     bench_run(&b, 30);
     assert_int_not_equal(bench_status(&b)->state, LUMI_ENGINE_DONE);
     assert_int_equal(b.status.accepted, 0);
     b.disk_full = false;
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 300));
-    assert_true(bench_status(&b)->complete);
-    assert_int_equal(b.frames_out, 0);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    assert_complete(&b, 300);
+    end_whole(&b);
 }
 
 static void a_capture_that_was_stopped_says_what_is_missing(void **state)
@@ -266,7 +252,7 @@ static void a_capture_that_was_stopped_says_what_is_missing(void **state)
     lumi_engine_destroy(b.engine);
     bench_engine(&b);
     b.flaws[1][0] = BENCH_NO_FRAME;
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
     assert_false(bench_status(&b)->complete);
     assert_int_equal(lumi_engine_missing(b.engine, missing, 8), 1);
@@ -276,11 +262,9 @@ static void a_capture_that_was_stopped_says_what_is_missing(void **state)
     assert_string_equal(b.handed, "");
     /* And somebody takes it, though the capture is sealed. */
     assert_int_equal(lumi_engine_retake(b.engine, b.now, NULL, NULL, &error), LUMI_OK);
-    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
-    assert_true(bench_status(&b)->complete);
+    assert_complete(&b, 200);
     assert_string_equal(b.handed, b.status.capture);
-    assert_sealed_whole(&b);
-    bench_end(&b);
+    end_whole(&b);
 }
 
 /* ---- disks that cannot be written: in a namespace of our own, which is kept from then on ---- */
@@ -326,7 +310,6 @@ static void end_with_disk(struct bench *b)
 static void a_start_on_a_read_only_disk_is_red_and_makes_nothing(void **state)
 {
     struct bench b;
-    struct lumi_error error = {0};
 
     (void)state;
     if (!namespace_is_ours())
@@ -334,7 +317,7 @@ static void a_start_on_a_read_only_disk_is_red_and_makes_nothing(void **state)
     bench_begin(&b, LUMI_PLAN_START_STOP, 1);
     lumi_engine_disk(b.engine, b.now, INT64_C(1) << 40, 1e9); /* so it was when it was last looked at */
     assert_int_equal(mount("disk", b.folder, "tmpfs", MS_RDONLY, NULL), 0);
-    assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+    start(&b);
     assert_true(bench_until(&b, LUMI_ENGINE_RED, 100));
     const struct lumi_engine_check *check = bench_check(&b, "disk");
     assert_non_null(check);
@@ -353,12 +336,11 @@ static void a_start_on_a_full_disk_is_refused_and_leaves_nothing(void **state)
         skip();
     for (int kib = 16; kib <= 4096; kib = kib < 512 ? kib + 16 : kib * 2) {
         struct bench b;
-        struct lumi_error error = {0};
         char options[32];
         bench_begin(&b, LUMI_PLAN_START_STOP, 1);
         snprintf(options, sizeof options, "size=%dk", kib);
         assert_int_equal(mount("disk", b.folder, "tmpfs", 0, options), 0);
-        assert_int_equal(bench_start(&b, false, &error), LUMI_OK);
+        start(&b);
         bool arming = bench_until(&b, LUMI_ENGINE_ARMING, 60);
         bench_status(&b);
         begun += arming;
