@@ -1,6 +1,8 @@
 /* lumi capture stop: end the sweep. */
 #include "cli/capture_text.h"
 
+#include <stdio.h>
+
 static gboolean json, at_once, keep_open, emergency;
 
 static const GOptionEntry options[] = {
@@ -12,6 +14,27 @@ static const GOptionEntry options[] = {
     {0},
 };
 
+static int stop_now(struct lumi_error *error)
+{
+    g_autofree char *text = NULL;
+    struct cli_lumid *lumid;
+    JsonNode *root = NULL;
+    int code;
+
+    LUMI_TRY(cli_lumid_open(&lumid, error));
+    code = cli_lumid_post(lumid, "/api/v1/capture/emergency-stop", NULL, &root, &text, error);
+    if (code == LUMI_OK && json)
+        puts(text);
+    else if (code == LUMI_OK)
+        puts(json_object_get_boolean_member_with_default(json_node_get_object(root), "sent", FALSE)
+                 ? "emergency stop: it has gone to the board"
+                 : "emergency stop: the board is away; it is stopped when it comes back. Use the switch at the rig");
+    if (root)
+        json_node_unref(root);
+    cli_lumid_close(lumid);
+    return code;
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     g_autoptr(JsonBuilder) body = NULL;
@@ -21,7 +44,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     if (emergency && (at_once || keep_open))
         return lumi_fail(error, LUMI_ERR_ARG, "--emergency goes with neither --now nor --keep-open");
     if (emergency)
-        return cli_capture_wish("/api/v1/capture/emergency-stop", NULL, json, "emergency stop", error);
+        return stop_now(error);
     body = json_builder_new();
     json_builder_begin_object(body);
     json_builder_set_member_name(body, "at_once");

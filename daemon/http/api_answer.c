@@ -9,22 +9,37 @@ static const char *phrase(unsigned status)
     return status == 421 ? "Misdirected Request" : soup_status_get_phrase(status);
 }
 
-void lumi_api_answer(SoupServerMessage *message, unsigned status, const char *type, char *text)
+void lumi_api_answer(struct lumi_api_answer *answer, unsigned status, const char *type, char *text)
+{
+    g_free(answer->text);
+    *answer = (struct lumi_api_answer){.status = status, .type = type, .text = text};
+}
+
+void lumi_api_answer_json(struct lumi_api_answer *answer, unsigned status, JsonBuilder *builder)
+{
+    lumi_api_answer(answer, status, "application/json", lumi_api_finish(builder));
+}
+
+void lumi_api_send(SoupServerMessage *message, struct lumi_api_answer *answer)
 {
     SoupMessageHeaders *headers = soup_server_message_get_response_headers(message);
 
     soup_message_headers_replace(headers, "Cache-Control", "no-store");
     soup_message_headers_replace(headers, "X-Content-Type-Options", "nosniff");
-    soup_server_message_set_status(message, status, phrase(status));
-    soup_server_message_set_response(message, type, SOUP_MEMORY_TAKE, text, strlen(text));
+    soup_server_message_set_status(message, answer->status, phrase(answer->status));
+    soup_server_message_set_response(message, answer->type, SOUP_MEMORY_TAKE, answer->text, strlen(answer->text));
+    *answer = (struct lumi_api_answer){0};
 }
 
-void lumi_api_answer_json(SoupServerMessage *message, unsigned status, JsonBuilder *builder)
+void lumi_api_send_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail)
 {
-    lumi_api_answer(message, status, "application/json", lumi_api_finish(builder));
+    struct lumi_api_answer answer = {0};
+
+    lumi_api_problem(&answer, status, word, detail);
+    lumi_api_send(message, &answer);
 }
 
-char *lumi_api_problem_text(unsigned status, const char *word, const char *detail)
+static char *problem_text(unsigned status, const char *word, const char *detail)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
     g_autofree char *type = g_strconcat("urn:lumid:", word, NULL);
@@ -40,19 +55,19 @@ char *lumi_api_problem_text(unsigned status, const char *word, const char *detai
 
 char *lumi_api_problem_message(unsigned status, const char *word, const char *detail)
 {
-    g_autofree char *document = lumi_api_problem_text(status, word, detail);
+    g_autofree char *document = problem_text(status, word, detail);
 
     return g_strdup_printf("HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nContent-Length: "
                            "%zu\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n%s",
                            status, phrase(status), strlen(document), document);
 }
 
-void lumi_api_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail)
+void lumi_api_problem(struct lumi_api_answer *answer, unsigned status, const char *word, const char *detail)
 {
-    lumi_api_answer(message, status, "application/problem+json", lumi_api_problem_text(status, word, detail));
+    lumi_api_answer(answer, status, "application/problem+json", problem_text(status, word, detail));
 }
 
-void lumi_api_problem_of(SoupServerMessage *message, int code, const char *text)
+void lumi_api_problem_of(struct lumi_api_answer *answer, int code, const char *text)
 {
     static const struct {
         int code;
@@ -76,8 +91,8 @@ void lumi_api_problem_of(SoupServerMessage *message, int code, const char *text)
 
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++)
         if (table[i].code == code) {
-            lumi_api_problem(message, table[i].status, table[i].word, text);
+            lumi_api_problem(answer, table[i].status, table[i].word, text);
             return;
         }
-    lumi_api_problem(message, 500, "internal", text);
+    lumi_api_problem(answer, 500, "internal", text);
 }

@@ -7,7 +7,7 @@
 #define MISSING_MAX 4096
 #define LIST_MAX 256
 
-static void answer_capture(struct lumi_http *http, SoupServerMessage *message, unsigned status)
+static void answer_capture(struct lumi_http *http, struct lumi_api_answer *answer, unsigned status)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
 
@@ -16,16 +16,17 @@ static void answer_capture(struct lumi_http *http, SoupServerMessage *message, u
     lumi_api_capture(builder, http->status);
     lumi_api_checks(builder, http->status);
     json_builder_end_object(builder);
-    lumi_api_answer_json(message, status, builder);
+    lumi_api_answer_json(answer, status, builder);
 }
 
 /* What an operator wanted was taken (202: what comes of it is told by events), or not. */
-static void answer_wish(struct lumi_http *http, SoupServerMessage *message, int code, const struct lumi_error *error)
+static void answer_wish(struct lumi_http *http, struct lumi_api_answer *answer, int code,
+                        const struct lumi_error *error)
 {
     if (code == LUMI_OK)
-        answer_capture(http, message, 202);
+        answer_capture(http, answer, 202);
     else
-        lumi_api_problem_of(message, code, error->text);
+        lumi_api_problem_of(answer, code, error->text);
 }
 
 static int64_t now(struct lumi_http *http)
@@ -33,7 +34,7 @@ static int64_t now(struct lumi_http *http)
     return http->options.now_ns(http->options.context);
 }
 
-static void get_status(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void get_status(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
 
@@ -42,13 +43,13 @@ static void get_status(struct lumi_http *http, SoupServerMessage *message, const
     json_builder_begin_object(builder);
     lumi_api_status(builder, http->status);
     json_builder_end_object(builder);
-    lumi_api_answer_json(message, 200, builder);
+    lumi_api_answer_json(answer, 200, builder);
 }
 
-static void get_capture(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void get_capture(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     (void)body;
-    answer_capture(http, message, 200);
+    answer_capture(http, answer, 200);
 }
 
 enum { START_PLAN, START_NAME, START_TITLE, START_OVERRIDE };
@@ -60,7 +61,7 @@ static const struct lumi_api_field start_fields[] = {
     {0},
 };
 
-static void start(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body, bool only)
+static void start(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body, bool only)
 {
     const char *plan = body->values[START_PLAN].string;
     struct lumi_engine_start wanted = {
@@ -72,35 +73,35 @@ static void start(struct lumi_http *http, SoupServerMessage *message, const stru
     struct lumi_error error;
     int code = lumi_engine_start(http->options.engine, now(http), plan, strlen(plan), &wanted, &error);
 
-    answer_wish(http, message, code, &error);
+    answer_wish(http, answer, code, &error);
 }
 
-static void post_start(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_start(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
-    start(http, message, body, false);
+    start(http, answer, body, false);
 }
 
-static void post_preflight(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_preflight(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
-    start(http, message, body, true);
+    start(http, answer, body, true);
 }
 
 static const struct lumi_api_field no_fields[] = {{0}};
 
-static void post_pause(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_pause(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     struct lumi_error error;
 
     (void)body;
-    answer_wish(http, message, lumi_engine_pause(http->options.engine, now(http), &error), &error);
+    answer_wish(http, answer, lumi_engine_pause(http->options.engine, now(http), &error), &error);
 }
 
-static void post_resume(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_resume(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     struct lumi_error error;
 
     (void)body;
-    answer_wish(http, message, lumi_engine_resume(http->options.engine, now(http), &error), &error);
+    answer_wish(http, answer, lumi_engine_resume(http->options.engine, now(http), &error), &error);
 }
 
 static const struct lumi_api_field stop_fields[] = {
@@ -109,13 +110,13 @@ static const struct lumi_api_field stop_fields[] = {
     {0},
 };
 
-static void post_stop(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_stop(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     struct lumi_error error;
     int code =
         lumi_engine_stop(http->options.engine, now(http), body->values[0].boolean, body->values[1].boolean, &error);
 
-    answer_wish(http, message, code, &error);
+    answer_wish(http, answer, code, &error);
 }
 
 static const struct lumi_api_field retake_fields[] = {
@@ -124,31 +125,57 @@ static const struct lumi_api_field retake_fields[] = {
     {0},
 };
 
-static void post_retake(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_retake(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     struct lumi_error error;
     int code = lumi_engine_retake(http->options.engine, now(http), body->values[0].string,
                                   (const char *const *)body->values[1].strings, &error);
 
-    answer_wish(http, message, code, &error);
+    answer_wish(http, answer, code, &error);
 }
 
-static void post_clear(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_clear(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     struct lumi_error error;
 
     (void)body;
-    answer_wish(http, message, lumi_engine_clear(http->options.engine, now(http), &error), &error);
+    answer_wish(http, answer, lumi_engine_clear(http->options.engine, now(http), &error), &error);
 }
 
-static void post_emergency_stop(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+struct stop_letter {
+    struct lumi_api_letter letter;
+    struct lumi_http *http;
+};
+
+static void tell_stop(struct lumi_api_letter *letter, bool dropped)
 {
-    (void)body;
-    lumi_engine_emergency_stop(http->options.engine, now(http));
-    answer_capture(http, message, 202);
+    struct lumi_http *http = ((struct stop_letter *)letter)->http;
+
+    if (!dropped)
+        lumi_engine_emergency_stop(http->options.engine, now(http));
+    g_free(letter);
 }
 
-static void get_missing(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+/* The board first, from this thread; the engine is told when it gets round to it. */
+static void serve_emergency_stop(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+{
+    bool sent = http->options.emergency_stop(http->options.context);
+    struct stop_letter *letter = g_new0(struct stop_letter, 1);
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+    struct lumi_api_answer answer = {0};
+
+    (void)body;
+    letter->letter.read = tell_stop;
+    letter->http = http;
+    lumi_api_post_give(http->to_engine, &letter->letter);
+    json_builder_begin_object(builder);
+    lumi_api_put_bool(builder, "sent", sent);
+    json_builder_end_object(builder);
+    lumi_api_answer_json(&answer, 202, builder);
+    lumi_api_send(message, &answer);
+}
+
+static void get_missing(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     g_autofree struct lumi_engine_missing *list = g_new0(struct lumi_engine_missing, MISSING_MAX);
     g_autoptr(JsonBuilder) builder = json_builder_new();
@@ -165,10 +192,10 @@ static void get_missing(struct lumi_http *http, SoupServerMessage *message, cons
     }
     json_builder_end_array(builder);
     json_builder_end_object(builder);
-    lumi_api_answer_json(message, 200, builder);
+    lumi_api_answer_json(answer, 200, builder);
 }
 
-static void get_processing(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void get_processing(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     g_autofree struct lumi_process_status *list = g_new0(struct lumi_process_status, LIST_MAX);
     g_autoptr(JsonBuilder) builder = json_builder_new();
@@ -185,7 +212,7 @@ static void get_processing(struct lumi_http *http, SoupServerMessage *message, c
     }
     json_builder_end_array(builder);
     json_builder_end_object(builder);
-    lumi_api_answer_json(message, 200, builder);
+    lumi_api_answer_json(answer, 200, builder);
 }
 
 static const struct lumi_api_field process_fields[] = {
@@ -194,25 +221,25 @@ static const struct lumi_api_field process_fields[] = {
     {0},
 };
 
-static void post_processing(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void post_processing(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     struct lumi_error error;
     int code;
 
     if (!http->options.handover) {
-        lumi_api_problem(message, 409, "busy", "the configuration names no processing command");
+        lumi_api_problem(answer, 409, "busy", "the configuration names no processing command");
         return;
     }
     code = lumi_handover_give(http->options.handover, body->values[0].string, body->values[1].boolean, &error);
     if (code != LUMI_OK)
-        lumi_api_problem_of(message, code, error.text);
+        lumi_api_problem_of(answer, code, error.text);
     else {
-        get_processing(http, message, body);
-        soup_server_message_set_status(message, 202, NULL);
+        get_processing(http, answer, body);
+        answer->status = 202;
     }
 }
 
-static void get_ingest(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void get_ingest(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     g_autofree struct lumi_ingest_status *list = g_new0(struct lumi_ingest_status, LIST_MAX);
     g_autoptr(JsonBuilder) builder = json_builder_new();
@@ -229,42 +256,42 @@ static void get_ingest(struct lumi_http *http, SoupServerMessage *message, const
     }
     json_builder_end_array(builder);
     json_builder_end_object(builder);
-    lumi_api_answer_json(message, 200, builder);
+    lumi_api_answer_json(answer, 200, builder);
 }
 
-static void get_metrics(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void get_metrics(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     (void)body;
     lumi_engine_status(http->options.engine, http->status);
-    lumi_api_answer(message, 200, "text/plain; version=0.0.4; charset=utf-8", lumi_api_metrics(http->status));
+    lumi_api_answer(answer, 200, "text/plain; version=0.0.4; charset=utf-8", lumi_api_metrics(http->status));
 }
 
-static void get_openapi(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+static void get_openapi(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     (void)http;
     (void)body;
-    lumi_api_answer(message, 200, "application/json", g_strdup(lumi_api_openapi));
+    lumi_api_answer(answer, 200, "application/json", g_strdup(lumi_api_openapi));
 }
 
 const struct lumi_api_route lumi_api_routes[] = {
-    {"/api/v1/status", "GET", NULL, get_status},
-    {"/api/v1/devices", "GET", NULL, lumi_api_get_devices},
-    {"/api/v1/capture", "GET", NULL, get_capture},
-    {"/api/v1/capture/preflight", "POST", start_fields, post_preflight},
-    {"/api/v1/capture/start", "POST", start_fields, post_start},
-    {"/api/v1/capture/pause", "POST", no_fields, post_pause},
-    {"/api/v1/capture/resume", "POST", no_fields, post_resume},
-    {"/api/v1/capture/stop", "POST", stop_fields, post_stop},
-    {"/api/v1/capture/retake", "POST", retake_fields, post_retake},
-    {"/api/v1/capture/clear", "POST", no_fields, post_clear},
-    {"/api/v1/capture/emergency-stop", "POST", no_fields, post_emergency_stop},
-    {"/api/v1/captures", "GET", NULL, lumi_api_get_captures},
-    {"/api/v1/missing", "GET", NULL, get_missing},
-    {"/api/v1/processing", "GET", NULL, get_processing},
-    {"/api/v1/processing", "POST", process_fields, post_processing},
-    {"/api/v1/ingest", "GET", NULL, get_ingest},
-    {"/api/v1/events", "GET", NULL, lumi_api_get_events},
-    {"/metrics", "GET", NULL, get_metrics},
-    {"/openapi.json", "GET", NULL, get_openapi},
+    {"/api/v1/status", "GET", NULL, get_status, NULL},
+    {"/api/v1/devices", "GET", NULL, NULL, lumi_api_serve_devices},
+    {"/api/v1/capture", "GET", NULL, get_capture, NULL},
+    {"/api/v1/capture/preflight", "POST", start_fields, post_preflight, NULL},
+    {"/api/v1/capture/start", "POST", start_fields, post_start, NULL},
+    {"/api/v1/capture/pause", "POST", no_fields, post_pause, NULL},
+    {"/api/v1/capture/resume", "POST", no_fields, post_resume, NULL},
+    {"/api/v1/capture/stop", "POST", stop_fields, post_stop, NULL},
+    {"/api/v1/capture/retake", "POST", retake_fields, post_retake, NULL},
+    {"/api/v1/capture/clear", "POST", no_fields, post_clear, NULL},
+    {"/api/v1/capture/emergency-stop", "POST", no_fields, NULL, serve_emergency_stop},
+    {"/api/v1/captures", "GET", NULL, NULL, lumi_api_serve_captures},
+    {"/api/v1/missing", "GET", NULL, get_missing, NULL},
+    {"/api/v1/processing", "GET", NULL, get_processing, NULL},
+    {"/api/v1/processing", "POST", process_fields, post_processing, NULL},
+    {"/api/v1/ingest", "GET", NULL, get_ingest, NULL},
+    {"/api/v1/events", "GET", NULL, lumi_api_see_events, lumi_api_serve_events},
+    {"/metrics", "GET", NULL, get_metrics, NULL},
+    {"/openapi.json", "GET", NULL, get_openapi, NULL},
     {0},
 };

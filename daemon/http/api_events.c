@@ -36,14 +36,35 @@ struct listener {
 
 struct lumi_api_events {
     struct lumi_http *http;
+    /* In the engine's thread. */
+    GArray *told; /* struct lumi_engine_told: not in the ring yet */
+    uint64_t told_lost;
+    GSource *idle;
+    char *seen; /* the progress that was told last */
+    /* In the server's. */
     uint32_t epoch;
     struct event ring[RING];
     uint64_t first, next; /* numbers of the oldest that is kept, of the next there will be */
-    GArray *told;         /* struct lumi_engine_told: not in the ring yet */
     GPtrArray *listeners;
     char *progress;
     uint64_t progress_number;
-    guint idle, tick;
+    bool looking; /* the engine is being asked how far it is */
+    GSource *tick;
+};
+
+/* From the engine's thread to the server's. */
+struct news {
+    struct lumi_api_letter letter;
+    struct lumi_api_events *events;
+    GArray *items; /* struct item */
+    uint64_t lost; /* that came before them */
+    char *progress;
+    bool looked; /* it was asked for */
+};
+
+struct item {
+    const char *kind;
+    char *data;
 };
 
 /* ---- the ring ---- */
@@ -58,6 +79,69 @@ static void keep(struct lumi_api_events *events, const char *kind, char *data)
     if (events->next - events->first > RING)
         events->first = events->next - RING;
 }
+
+/* Of those that were never kept there are numbers only. */
+static void keep_lost(struct lumi_api_events *events, uint64_t lost)
+{
+    events->next += lost;
+    if (lost)
+        events->first = events->next;
+}
+
+/* ---- news ---- */
+
+static void pump_all(struct lumi_api_events *events);
+
+static void take_news(struct lumi_api_letter *letter, bool dropped)
+{
+    struct news *news = (struct news *)letter;
+    struct lumi_api_events *events = news->events;
+
+    if (!dropped)
+        keep_lost(events, news->lost);
+    for (guint i = 0; i < news->items->len; i++) {
+        struct item *item = &g_array_index(news->items, struct item, i);
+        if (dropped)
+            g_free(item->data);
+        else
+            keep(events, item->kind, item->data);
+    }
+    if (news->progress) {
+        g_free(events->progress);
+        events->progress = news->progress;
+        events->progress_number++;
+    }
+    if (!dropped) {
+        events->looking = events->looking && !news->looked;
+        pump_all(events);
+    }
+    g_array_unref(news->items);
+    g_free(news);
+}
+
+static struct news *make_news(struct lumi_api_events *events)
+{
+    struct news *news = g_new0(struct news, 1);
+
+    news->letter.read = take_news;
+    news->events = events;
+    news->items = g_array_new(FALSE, FALSE, sizeof(struct item));
+    return news;
+}
+
+static void add_item(struct news *news, const char *kind, char *data)
+{
+    struct item item = {.kind = kind, .data = data};
+
+    g_array_append_val(news->items, item);
+}
+
+static void send_news(struct news *news)
+{
+    lumi_api_post_give(news->events->http->to_server, &news->letter);
+}
+
+/* ---- in the engine's thread ---- */
 
 static const char *kind_name(enum lumi_engine_tale kind)
 {
@@ -87,7 +171,7 @@ static void describe(JsonBuilder *builder, const struct lumi_engine_told *told, 
 }
 
 /* The engine must not be asked while it tells; so what it told becomes events a moment later. */
-static void take_told(struct lumi_api_events *events)
+static void take_told(struct lumi_api_events *events, struct news *news)
 {
     g_autoptr(JsonBuilder) builder = NULL;
 
@@ -100,12 +184,70 @@ static void take_told(struct lumi_api_events *events)
         json_builder_begin_object(builder);
         describe(builder, told, events->http->status);
         json_builder_end_object(builder);
-        keep(events, kind_name(told->kind), lumi_api_finish(builder));
+        add_item(news, kind_name(told->kind), lumi_api_finish(builder));
     }
     g_array_set_size(events->told, 0);
+    news->lost = events->told_lost;
+    events->told_lost = 0;
 }
 
-/* ---- listeners ---- */
+static gboolean on_idle(void *context)
+{
+    struct lumi_api_events *events = context;
+    struct news *news = make_news(events);
+
+    lumi_api_drop(&events->idle);
+    take_told(events, news);
+    send_news(news);
+    return G_SOURCE_REMOVE;
+}
+
+static void see_progress(struct lumi_api_events *events, struct news *news)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+
+    lumi_engine_status(events->http->options.engine, events->http->status);
+    json_builder_begin_object(builder);
+    lumi_api_capture(builder, events->http->status);
+    json_builder_end_object(builder);
+    g_autofree char *text = lumi_api_finish(builder);
+    if (g_strcmp0(text, events->seen)) {
+        g_free(events->seen);
+        events->seen = g_steal_pointer(&text);
+        news->progress = g_strdup(events->seen);
+    }
+}
+
+static void look(struct lumi_api_events *events, bool asked)
+{
+    struct news *news = make_news(events);
+
+    take_told(events, news);
+    see_progress(events, news);
+    news->looked = asked;
+    send_news(news);
+}
+
+void lumi_api_see_events(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
+{
+    (void)answer;
+    (void)body;
+    look(http->events, false);
+}
+
+struct look_letter {
+    struct lumi_api_letter letter;
+    struct lumi_api_events *events;
+};
+
+static void on_look(struct lumi_api_letter *letter, bool dropped)
+{
+    if (!dropped)
+        look(((struct look_letter *)letter)->events, true);
+    g_free(letter);
+}
+
+/* ---- listeners, in the server's thread ---- */
 
 static void put_event(GString *block, const char *kind, const char *data)
 {
@@ -159,38 +301,6 @@ static void pump_all(struct lumi_api_events *events)
         pump(events->listeners->pdata[i]);
 }
 
-static gboolean on_idle(void *context)
-{
-    struct lumi_api_events *events = context;
-
-    events->idle = 0;
-    take_told(events);
-    pump_all(events);
-    return G_SOURCE_REMOVE;
-}
-
-static void wake(struct lumi_api_events *events)
-{
-    if (!events->idle)
-        events->idle = g_idle_add_full(G_PRIORITY_DEFAULT, on_idle, events, NULL);
-}
-
-static void see_progress(struct lumi_api_events *events)
-{
-    g_autoptr(JsonBuilder) builder = json_builder_new();
-
-    lumi_engine_status(events->http->options.engine, events->http->status);
-    json_builder_begin_object(builder);
-    lumi_api_capture(builder, events->http->status);
-    json_builder_end_object(builder);
-    g_autofree char *text = lumi_api_finish(builder);
-    if (g_strcmp0(text, events->progress)) {
-        g_free(events->progress);
-        events->progress = g_steal_pointer(&text);
-        events->progress_number++;
-    }
-}
-
 /* The server does not read from who listens, so nobody tells it that the other side has closed. */
 static bool has_hung_up(GSocket *socket)
 {
@@ -217,11 +327,16 @@ static gboolean on_tick(void *context)
     int64_t now = events->http->options.now_ns(events->http->options.context);
 
     if (!events->listeners->len) {
-        events->tick = 0;
+        lumi_api_drop(&events->tick);
         return G_SOURCE_REMOVE;
     }
-    take_told(events);
-    see_progress(events);
+    if (!events->looking) {
+        struct look_letter *letter = g_new0(struct look_letter, 1);
+        letter->letter.read = on_look;
+        letter->events = events;
+        events->looking = true;
+        lumi_api_post_give(events->http->to_engine, &letter->letter);
+    }
     for (guint i = 0; i < events->listeners->len; i++)
         look_after(events->listeners->pdata[i], now);
     pump_all(events);
@@ -268,7 +383,7 @@ static uint64_t where_to_begin(const struct lumi_api_events *events, SoupServerM
     return number + 1;
 }
 
-void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+void lumi_api_serve_events(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
 {
     struct lumi_api_events *events = http->events;
     SoupMessageHeaders *headers = soup_server_message_get_response_headers(message);
@@ -276,11 +391,9 @@ void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, con
 
     (void)body;
     if (events->listeners->len >= LISTENERS) {
-        lumi_api_problem(message, 503, "limit", "too many listen to the events already");
+        lumi_api_send_problem(message, 503, "limit", "too many listen to the events already");
         return;
     }
-    take_told(events);
-    see_progress(events);
     listener = g_new0(struct listener, 1);
     listener->events = events;
     listener->message = g_object_ref(message);
@@ -298,7 +411,7 @@ void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, con
     g_ptr_array_add(events->listeners, listener);
     send_block(listener, g_string_new("retry: 2000\n\n"));
     if (!events->tick)
-        events->tick = g_timeout_add(TICK_MS, on_tick, events);
+        events->tick = lumi_api_attach(g_timeout_source_new(TICK_MS), G_PRIORITY_DEFAULT, on_tick, events);
 }
 
 /* ---- life ---- */
@@ -321,10 +434,8 @@ void lumi_api_events_destroy(struct lumi_api_events *events)
 {
     if (!events)
         return;
-    if (events->idle)
-        g_source_remove(events->idle);
-    if (events->tick)
-        g_source_remove(events->tick);
+    lumi_api_drop(&events->idle);
+    lumi_api_drop(&events->tick);
     for (guint i = 0; i < events->listeners->len; i++) {
         struct listener *listener = events->listeners->pdata[i];
         g_signal_handlers_disconnect_by_data(listener->message, listener);
@@ -334,6 +445,7 @@ void lumi_api_events_destroy(struct lumi_api_events *events)
     for (int i = 0; i < RING; i++)
         g_free(events->ring[i].data);
     g_free(events->progress);
+    g_free(events->seen);
     g_free(events);
 }
 
@@ -341,31 +453,37 @@ void lumi_api_events_told(struct lumi_api_events *events, const struct lumi_engi
 {
     if (events->told->len >= RING) { /* the main loop has not come round for long: the oldest is lost, and counted */
         g_array_remove_index(events->told, 0);
-        events->next++;
-        events->first = events->next;
+        events->told_lost++;
     }
     g_array_append_val(events->told, *told);
-    wake(events);
+    if (!events->idle) {
+        events->idle = g_idle_source_new();
+        g_source_set_priority(events->idle, G_PRIORITY_DEFAULT);
+        g_source_set_callback(events->idle, on_idle, events, NULL);
+        g_source_attach(events->idle, NULL);
+    }
 }
 
 void lumi_api_events_processing(struct lumi_api_events *events, const struct lumi_process_status *status)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
+    struct news *news = make_news(events);
 
     json_builder_begin_object(builder);
     lumi_api_processing(builder, status);
     json_builder_end_object(builder);
-    keep(events, "processing", lumi_api_finish(builder));
-    wake(events);
+    add_item(news, "processing", lumi_api_finish(builder));
+    send_news(news);
 }
 
 void lumi_api_events_ingest(struct lumi_api_events *events, const struct lumi_ingest_status *status)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
+    struct news *news = make_news(events);
 
     json_builder_begin_object(builder);
     lumi_api_ingest(builder, status);
     json_builder_end_object(builder);
-    keep(events, "ingest", lumi_api_finish(builder));
-    wake(events);
+    add_item(news, "ingest", lumi_api_finish(builder));
+    send_news(news);
 }

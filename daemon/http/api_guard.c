@@ -35,14 +35,14 @@ struct connection {
 struct watch {
     struct lumi_api_guard *guard;
     GSocket *socket;
-    guint source, timer;
+    GSource *source, *timer;
 };
 
 struct lumi_api_guard {
     struct lumi_http *http;
     GHashTable *connections; /* GSocket → struct connection */
     GPtrArray *watches;
-    guint tick;
+    GSource *tick;
 };
 
 static int64_t now(const struct lumi_api_guard *guard)
@@ -132,7 +132,7 @@ static gboolean on_tick(void *context)
     gpointer value;
 
     if (!g_hash_table_size(guard->connections)) {
-        guard->tick = 0;
+        lumi_api_drop(&guard->tick);
         return G_SOURCE_REMOVE;
     }
     g_hash_table_iter_init(&at, guard->connections);
@@ -179,7 +179,7 @@ static void on_started(SoupServer *server, SoupServerMessage *message, void *con
     if (is_one_too_many(made))
         refuse(made);
     if (!guard->tick)
-        guard->tick = g_timeout_add(TICK_MS, on_tick, guard);
+        guard->tick = lumi_api_attach(g_timeout_source_new(TICK_MS), G_PRIORITY_DEFAULT, on_tick, guard);
 }
 
 static void on_read(SoupServer *server, SoupServerMessage *message, void *context)
@@ -216,7 +216,7 @@ static gboolean listen_again(void *context)
     if (spare < 0)
         return G_SOURCE_CONTINUE;
     close(spare);
-    watching->timer = 0;
+    lumi_api_drop(&watching->timer);
     if (!soup_server_listen_socket(http->server, watching->socket, http->https ? SOUP_SERVER_LISTEN_HTTPS : 0, NULL))
         g_warning("HTTP: nobody is listened to any more");
     look(watching);
@@ -229,25 +229,23 @@ static gboolean on_waiting(gint fd, GIOCondition condition, void *context)
 
     (void)fd;
     (void)condition;
-    watching->source = 0;
-    watching->timer = g_timeout_add(AGAIN_MS, listen_again, watching);
+    lumi_api_drop(&watching->source);
+    watching->timer = lumi_api_attach(g_timeout_source_new(AGAIN_MS), G_PRIORITY_DEFAULT, listen_again, watching);
     return G_SOURCE_REMOVE;
 }
 
 static void look(struct watch *watch)
 {
-    watch->source =
-        g_unix_fd_add_full(G_PRIORITY_LOW, g_socket_get_fd(watch->socket), G_IO_IN, on_waiting, watch, NULL);
+    watch->source = lumi_api_attach(g_unix_fd_source_new(g_socket_get_fd(watch->socket), G_IO_IN), G_PRIORITY_LOW,
+                                    G_SOURCE_FUNC(on_waiting), watch);
 }
 
 static void free_watch(void *data)
 {
     struct watch *watch = data;
 
-    if (watch->source)
-        g_source_remove(watch->source);
-    if (watch->timer)
-        g_source_remove(watch->timer);
+    lumi_api_drop(&watch->source);
+    lumi_api_drop(&watch->timer);
     g_object_unref(watch->socket);
     g_free(watch);
 }
@@ -288,8 +286,7 @@ void lumi_api_guard_destroy(struct lumi_api_guard *guard)
     if (!guard)
         return;
     g_signal_handlers_disconnect_by_data(guard->http->server, guard);
-    if (guard->tick)
-        g_source_remove(guard->tick);
+    lumi_api_drop(&guard->tick);
     g_ptr_array_unref(guard->watches);
     g_hash_table_iter_init(&at, guard->connections);
     while (g_hash_table_iter_next(&at, &key, NULL))

@@ -1,4 +1,4 @@
-/* Answers that have to be looked for on disks and buses: in the worker, so that the engine's thread goes on. */
+/* Answers that have to be looked for on disks and buses: in the worker, so that the server goes on. */
 #include "daemon/http/api_priv.h"
 #include "daemon/http/api_report.h"
 #include "proto/capture/capture.h"
@@ -38,18 +38,18 @@ static void on_finished(SoupServerMessage *message, void *context)
     lookup->gone = true;
 }
 
-static void done(struct lumi_api_job *job)
+static void done(struct lumi_api_letter *letter, bool dropped)
 {
-    struct lookup *lookup = (struct lookup *)job;
+    struct lookup *lookup = (struct lookup *)letter;
 
     g_signal_handlers_disconnect_by_data(lookup->message, lookup);
-    if (!lookup->gone) {
-        if (lookup->answer)
-            lumi_api_answer(lookup->message, 200, "application/json", g_steal_pointer(&lookup->answer));
-        else if (lookup->code != LUMI_OK)
-            lumi_api_problem_of(lookup->message, lookup->code, lookup->error.text);
+    if (!lookup->gone && !dropped) {
+        struct lumi_api_answer answer = {0};
+        if (lookup->code != LUMI_OK)
+            lumi_api_problem_of(&answer, lookup->code, lookup->error.text);
         else
-            lumi_api_problem(lookup->message, 503, "busy", "lumid is ending");
+            lumi_api_answer(&answer, 200, "application/json", g_steal_pointer(&lookup->answer));
+        lumi_api_send(lookup->message, &answer);
         soup_server_message_unpause(lookup->message);
     }
     g_object_unref(lookup->message);
@@ -62,17 +62,17 @@ static void look_up(struct lumi_http *http, SoupServerMessage *message, void (*l
     struct lookup *lookup = g_new0(struct lookup, 1);
 
     lookup->job.work = work;
-    lookup->job.done = done;
+    lookup->job.letter.read = done;
     lookup->options = http->options;
     lookup->look = look;
-    if (!lumi_api_worker_give(http->worker, &lookup->job)) {
-        g_free(lookup);
-        lumi_api_problem(message, 503, "busy", "too many such questions wait for an answer already");
-        return;
-    }
     lookup->message = g_object_ref(message);
     g_signal_connect(message, "finished", G_CALLBACK(on_finished), lookup);
-    soup_server_message_pause(message);
+    if (lumi_api_worker_give(http->worker, &lookup->job)) {
+        soup_server_message_pause(message);
+        return;
+    }
+    done(&lookup->job.letter, true);
+    lumi_api_send_problem(message, 503, "busy", "too many such questions wait for an answer already");
 }
 
 /* ---- devices ---- */
@@ -116,7 +116,7 @@ static void look_for_devices(struct lookup *lookup)
     lookup->answer = lumi_api_finish(builder);
 }
 
-void lumi_api_get_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+void lumi_api_serve_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
 {
     (void)body;
     look_up(http, message, look_for_devices);
@@ -192,7 +192,7 @@ static void look_for_captures(struct lookup *lookup)
     lookup->answer = lumi_api_finish(builder);
 }
 
-void lumi_api_get_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
+void lumi_api_serve_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
 {
     (void)body;
     look_up(http, message, look_for_captures);

@@ -3,20 +3,31 @@
 #define LUMI_DAEMON_HTTP_API_PRIV_H
 
 #include "daemon/http/api_json.h"
+#include "daemon/http/api_post.h"
 #include "daemon/http/api_request.h"
 #include "daemon/http/api_server.h"
 #include "daemon/http/api_worker.h"
 
 #include <libsoup/soup.h>
+#include <pthread.h>
 
 struct lumi_api_events;
 struct lumi_api_guard;
 struct lumi_http {
     struct lumi_http_options options; /* its strings are copies */
+    GMainContext *context;            /* of the server's thread */
+    pthread_t thread;
+    bool running;
+    struct lumi_api_post *to_server, *to_engine;
+    /* In the server's thread. */
+    GMainLoop *loop;
     SoupServer *server;
     struct lumi_api_worker *worker;
-    struct lumi_api_events *events;
     struct lumi_api_guard *guard;
+    GPtrArray *refusals;
+    /* In both: each has members of its own. */
+    struct lumi_api_events *events;
+    /* In the engine's. */
     struct lumi_engine_status *status; /* for one handler at a time */
     bool https;
     int port;
@@ -24,37 +35,48 @@ struct lumi_http {
 
 /* ---- answers (api_answer.c) ---- */
 
+struct lumi_api_answer {
+    unsigned status; /* 0: none yet */
+    const char *type;
+    char *text;
+};
 /* Takes over `text`. */
-void lumi_api_answer(SoupServerMessage *message, unsigned status, const char *type, char *text);
+void lumi_api_answer(struct lumi_api_answer *answer, unsigned status, const char *type, char *text);
 /* Ends the builder. */
-void lumi_api_answer_json(SoupServerMessage *message, unsigned status, JsonBuilder *builder);
+void lumi_api_answer_json(struct lumi_api_answer *answer, unsigned status, JsonBuilder *builder);
 /* A problem document (RFC 9457). `word` becomes its type, "urn:lumid:WORD". */
-void lumi_api_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail);
-/* (transfer full) The document itself. */
-char *lumi_api_problem_text(unsigned status, const char *word, const char *detail);
+void lumi_api_problem(struct lumi_api_answer *answer, unsigned status, const char *word, const char *detail);
+/* For a code of the tree. */
+void lumi_api_problem_of(struct lumi_api_answer *answer, int code, const char *text);
+/* Becomes the message's; takes over what is in it. In the server's thread, as all that has to do with messages. */
+void lumi_api_send(SoupServerMessage *message, struct lumi_api_answer *answer);
+void lumi_api_send_problem(SoupServerMessage *message, unsigned status, const char *word, const char *detail);
 /* (transfer full) The whole answer, for a connection that the server has nothing to do with; closes it. */
 char *lumi_api_problem_message(unsigned status, const char *word, const char *detail);
-/* For a code of the tree. */
-void lumi_api_problem_of(SoupServerMessage *message, int code, const char *text);
 
 /* ---- what is asked for (api_calls.c, api_lists.c) ---- */
 
-typedef void (*lumi_api_call)(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 struct lumi_api_route {
     const char *path, *method;
     const struct lumi_api_field *fields; /* of the body; NULL: none is read */
-    lumi_api_call call;
+    /* In the engine's thread; its answer is sent if there is nothing else. NULL: the engine is not asked. */
+    void (*call)(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+    /* In the server's thread, after it. */
+    void (*serve)(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 };
 extern const struct lumi_api_route lumi_api_routes[]; /* path NULL ends it */
 
-void lumi_api_get_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
-void lumi_api_get_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 
 /* ---- events (api_events.c) ---- */
 
 int lumi_api_events_create(struct lumi_http *http, struct lumi_api_events **events, struct lumi_error *error);
 void lumi_api_events_destroy(struct lumi_api_events *events);
-void lumi_api_get_events(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+/* Server's thread: somebody listens. Before it the engine's brings the ring up to that moment. */
+void lumi_api_serve_events(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_see_events(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+/* Engine's thread. */
 void lumi_api_events_told(struct lumi_api_events *events, const struct lumi_engine_told *told);
 void lumi_api_events_processing(struct lumi_api_events *events, const struct lumi_process_status *status);
 void lumi_api_events_ingest(struct lumi_api_events *events, const struct lumi_ingest_status *status);
@@ -72,7 +94,10 @@ void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *messa
 
 /* Answers with a problem before the body has been read, and closes the connection; reads little of what is on its way
  * so that who sends it sees the answer. */
-void lumi_api_refuse_early(SoupServerMessage *message, unsigned status, const char *word, const char *detail);
+void lumi_api_refuse_early(struct lumi_http *http, SoupServerMessage *message, unsigned status, const char *word,
+                           const char *detail);
+/* Ends those that still read. */
+void lumi_api_refuse_finish(struct lumi_http *http);
 
 extern const char lumi_api_openapi[]; /* openapi.json, put into the program by the build */
 

@@ -12,19 +12,20 @@
 #define BLOCK 65536
 
 struct refusal {
+    struct lumi_http *http;
     GIOStream *stream;
     GSocket *socket; /* NULL: TLS over what is no socket */
     GCancellable *cancellable;
     char *answer;
     char *block;
-    guint timer;
+    GSource *timer;
     size_t read;
 };
 
 static void finish(struct refusal *refusal)
 {
-    if (refusal->timer)
-        g_source_remove(refusal->timer);
+    lumi_api_drop(&refusal->timer);
+    g_ptr_array_remove_fast(refusal->http->refusals, refusal);
     g_io_stream_close_async(refusal->stream, G_PRIORITY_DEFAULT, NULL, NULL, NULL);
     g_object_unref(refusal->stream);
     g_clear_object(&refusal->socket);
@@ -63,12 +64,14 @@ static gboolean on_timer(void *context)
 {
     struct refusal *refusal = context;
 
-    refusal->timer = 0;
+    lumi_api_drop(&refusal->timer);
     g_cancellable_cancel(refusal->cancellable);
     return G_SOURCE_REMOVE;
 }
 
 struct pending {
+    struct lumi_http *http;
+    GSource *idle;
     SoupServerMessage *message;
     char *answer;
 };
@@ -80,6 +83,7 @@ static gboolean answer_now(void *context)
     GSocket *socket = soup_server_message_get_socket(pending->message);
     struct refusal *refusal = g_new0(struct refusal, 1);
 
+    refusal->http = pending->http;
     if (socket)
         refusal->socket = g_object_ref(socket);
     refusal->stream = soup_server_message_steal_connection(pending->message);
@@ -87,7 +91,8 @@ static gboolean answer_now(void *context)
     refusal->cancellable = g_cancellable_new();
     if (refusal->stream) {
         refusal->block = g_malloc(BLOCK);
-        refusal->timer = g_timeout_add(LINGER_MS, on_timer, refusal);
+        refusal->timer = lumi_api_attach(g_timeout_source_new(LINGER_MS), G_PRIORITY_DEFAULT, on_timer, refusal);
+        g_ptr_array_add(refusal->http->refusals, refusal);
         g_output_stream_write_all_async(g_io_stream_get_output_stream(refusal->stream), refusal->answer,
                                         strlen(refusal->answer), G_PRIORITY_DEFAULT, refusal->cancellable, on_written,
                                         refusal);
@@ -97,18 +102,29 @@ static gboolean answer_now(void *context)
         g_free(refusal->answer);
         g_free(refusal);
     }
+    lumi_api_drop(&pending->idle);
     g_object_unref(pending->message);
     g_free(pending);
     return G_SOURCE_REMOVE;
 }
 
-void lumi_api_refuse_early(SoupServerMessage *message, unsigned status, const char *word, const char *detail)
+void lumi_api_refuse_early(struct lumi_http *http, SoupServerMessage *message, unsigned status, const char *word,
+                           const char *detail)
 {
     struct pending *pending = g_new0(struct pending, 1);
 
     soup_message_body_set_accumulate(soup_server_message_get_request_body(message), FALSE);
     soup_server_message_pause(message);
+    pending->http = http;
     pending->message = g_object_ref(message);
     pending->answer = lumi_api_problem_message(status, word, detail);
-    g_idle_add(answer_now, pending);
+    pending->idle = lumi_api_attach(g_idle_source_new(), G_PRIORITY_DEFAULT_IDLE, answer_now, pending);
+}
+
+void lumi_api_refuse_finish(struct lumi_http *http)
+{
+    for (guint i = 0; i < http->refusals->len; i++)
+        g_cancellable_cancel(((struct refusal *)http->refusals->pdata[i])->cancellable);
+    while (http->refusals->len)
+        g_main_context_iteration(http->context, TRUE);
 }

@@ -6,6 +6,7 @@
  * form can send. */
 #include "daemon/http/api_priv.h"
 
+#include <signal.h>
 #include <string.h>
 
 #define BODY_MAX (1 << 20)
@@ -55,12 +56,13 @@ static bool refused(struct lumi_http *http, SoupServerMessage *message)
     if (problem) {
         soup_message_headers_replace(soup_server_message_get_response_headers(message), "WWW-Authenticate",
                                      "Bearer realm=\"lumid\"");
-        lumi_api_problem(message, 401, "token", problem);
+        lumi_api_send_problem(message, 401, "token", problem);
     } else if (!shown && !lumi_api_host_is_local(host))
-        lumi_api_problem(message, 421, "host", "without a token only localhost, 127.0.0.1 and [::1] are answered to");
+        lumi_api_send_problem(message, 421, "host",
+                              "without a token only localhost, 127.0.0.1 and [::1] are answered to");
     else if ((origin && !lumi_api_origin_is_own(origin, http->https ? "https" : "http", host)) ||
              (site && strcmp(site, "same-origin") && strcmp(site, "none")))
-        lumi_api_problem(message, 403, "origin", "requests of other sites' pages are not answered");
+        lumi_api_send_problem(message, 403, "origin", "requests of other sites' pages are not answered");
     else
         return false;
     return true;
@@ -78,11 +80,11 @@ static void on_early(SoupServer *server, SoupServerMessage *message, const char 
     (void)path;
     (void)query;
     if (soup_message_headers_get_encoding(headers) == SOUP_ENCODING_CHUNKED)
-        lumi_api_refuse_early(message, 411, "length", "a body must say how long it is (Content-Length)");
+        lumi_api_refuse_early(http, message, 411, "length", "a body must say how long it is (Content-Length)");
     else if (length > 0 && (size_t)length > http->options.body_max) {
         text =
             g_strdup_printf("a body of %" G_GOFFSET_FORMAT " bytes; %zu are the most", length, http->options.body_max);
-        lumi_api_refuse_early(message, 413, "limit", text);
+        lumi_api_refuse_early(http, message, 413, "limit", text);
     }
 }
 
@@ -97,31 +99,108 @@ static void answer_no_method(SoupServerMessage *message, const char *path)
             g_string_append_printf(allowed, "%s%s", allowed->len ? ", " : "", lumi_api_routes[i].method);
     g_autofree char *detail = g_strdup_printf("here: %s", allowed->str);
     soup_message_headers_replace(soup_server_message_get_response_headers(message), "Allow", allowed->str);
-    lumi_api_problem(message, 405, "method", detail);
+    lumi_api_send_problem(message, 405, "method", detail);
+}
+
+/* A request on its way to the engine and back. */
+struct call {
+    struct lumi_api_letter letter;
+    struct lumi_http *http;
+    const struct lumi_api_route *route;
+    struct lumi_api_body body;
+    struct lumi_api_answer answer;
+    SoupServerMessage *message; /* the server's thread alone looks into it */
+    bool gone;                  /* who asked has hung up */
+};
+
+static void on_finished(SoupServerMessage *message, void *context)
+{
+    (void)message;
+    ((struct call *)context)->gone = true;
+}
+
+static void end_call(struct call *call)
+{
+    g_signal_handlers_disconnect_by_data(call->message, call);
+    g_object_unref(call->message);
+    g_free(call->answer.text);
+    lumi_api_body_clear(&call->body);
+    g_free(call);
+}
+
+/* In the server's thread. */
+static void come_back(struct lumi_api_letter *letter, bool dropped)
+{
+    struct call *call = (struct call *)letter;
+
+    if (!dropped && !call->gone) {
+        if (call->route->serve)
+            call->route->serve(call->http, call->message, &call->body);
+        else
+            lumi_api_send(call->message, &call->answer);
+        soup_server_message_unpause(call->message);
+    }
+    end_call(call);
+}
+
+/* In the engine's. A dropped one is seen when the server's thread has ended. */
+static void go_there(struct lumi_api_letter *letter, bool dropped)
+{
+    struct call *call = (struct call *)letter;
+
+    if (dropped) {
+        end_call(call);
+        return;
+    }
+    call->route->call(call->http, &call->answer, &call->body);
+    letter->read = come_back;
+    lumi_api_post_give(call->http->to_server, letter);
+}
+
+/* Takes over the body. */
+static void ask_engine(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_route *route,
+                       struct lumi_api_body *body)
+{
+    struct call *made = g_new0(struct call, 1);
+
+    *made = (struct call){.letter.read = go_there, .http = http, .route = route, .body = *body};
+    *body = (struct lumi_api_body){0};
+    made->message = g_object_ref(message);
+    g_signal_connect(message, "finished", G_CALLBACK(on_finished), made);
+    soup_server_message_pause(message);
+    lumi_api_post_give(http->to_engine, &made->letter);
+}
+
+static int read_body(SoupServerMessage *message, const struct lumi_api_route *route, struct lumi_api_body *body,
+                     struct lumi_api_answer *answer)
+{
+    const char *type = soup_message_headers_get_content_type(soup_server_message_get_request_headers(message), NULL);
+    GBytes *bytes = soup_message_body_flatten(soup_server_message_get_request_body(message));
+    struct lumi_error error;
+    size_t size;
+    const char *text = g_bytes_get_data(bytes, &size);
+    int code = LUMI_ERR_ARG;
+
+    if (size && g_strcmp0(type, "application/json"))
+        lumi_api_problem(answer, 415, "type", "a body must be JSON (Content-Type: application/json)");
+    else if ((code = lumi_api_body_parse(text, size, route->fields, body, &error)) != LUMI_OK)
+        lumi_api_problem_of(answer, code, error.text);
+    g_bytes_unref(bytes);
+    return code;
 }
 
 static void call(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_route *route)
 {
-    const char *type = soup_message_headers_get_content_type(soup_server_message_get_request_headers(message), NULL);
     struct lumi_api_body body = {0};
-    struct lumi_error error;
-    GBytes *bytes;
-    size_t size;
-    int code = LUMI_OK;
+    struct lumi_api_answer answer = {0};
 
-    if (route->fields) {
-        bytes = soup_message_body_flatten(soup_server_message_get_request_body(message));
-        const char *text = g_bytes_get_data(bytes, &size);
-        if (size && g_strcmp0(type, "application/json"))
-            lumi_api_problem(message, 415, "type", "a body must be JSON (Content-Type: application/json)");
-        else if ((code = lumi_api_body_parse(text, size, route->fields, &body, &error)) != LUMI_OK)
-            lumi_api_problem_of(message, code, error.text);
-        else
-            route->call(http, message, &body);
-        g_bytes_unref(bytes);
-        lumi_api_body_clear(&body);
-    } else
-        route->call(http, message, &body);
+    if (route->fields && read_body(message, route, &body, &answer) != LUMI_OK)
+        lumi_api_send(message, &answer);
+    else if (route->call)
+        ask_engine(http, message, route, &body);
+    else
+        route->serve(http, message, &body);
+    lumi_api_body_clear(&body);
 }
 
 static void on_request(SoupServer *server, SoupServerMessage *message, const char *path, GHashTable *query,
@@ -147,7 +226,7 @@ static void on_request(SoupServer *server, SoupServerMessage *message, const cha
     if (known)
         answer_no_method(message, path);
     else
-        lumi_api_problem(message, 404, "path", "there is nothing here; /openapi.json says what there is");
+        lumi_api_send_problem(message, 404, "path", "there is nothing here; /openapi.json says what there is");
 }
 
 /* ---- life ---- */
@@ -210,26 +289,94 @@ static void copy_options(struct lumi_http *http, const struct lumi_http_options 
     http->options.folder = g_strdup(options->folder);
 }
 
-int lumi_http_start(const struct lumi_http_options *options, struct lumi_http **http, struct lumi_error *error)
+/* ---- the thread ---- */
+
+static void *serve(void *context)
 {
-    struct lumi_http *made = g_new0(struct lumi_http, 1);
+    struct lumi_http *http = context;
+
+    g_main_context_push_thread_default(http->context);
+    g_main_loop_run(http->loop);
+    g_main_context_pop_thread_default(http->context);
+    return NULL;
+}
+
+/* Signals are for the program's own threads. */
+static int start_thread(struct lumi_http *http, struct lumi_error *error)
+{
+    sigset_t all, before;
+    int failed;
+
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    failed = pthread_create(&http->thread, NULL, serve, http);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    http->running = !failed;
+    return failed ? lumi_fail(error, LUMI_ERR_NOMEM, "HTTP: no thread could be started") : LUMI_OK;
+}
+
+struct last_letter {
+    struct lumi_api_letter letter;
+    struct lumi_http *http;
+};
+
+static void end_loop(struct lumi_api_letter *letter, bool dropped)
+{
+    struct lumi_http *http = ((struct last_letter *)letter)->http;
+
+    if (!dropped)
+        g_main_loop_quit(http->loop);
+    g_free(letter);
+}
+
+static void end_thread(struct lumi_http *http)
+{
+    struct last_letter *last = g_new0(struct last_letter, 1);
+
+    last->letter.read = end_loop;
+    last->http = http;
+    lumi_api_post_give(http->to_server, &last->letter);
+    pthread_join(http->thread, NULL);
+}
+
+/* What is made here is of the server's thread. */
+static int make_server(struct lumi_http *made, struct lumi_error *error)
+{
     int code;
 
-    copy_options(made, options);
-    made->status = g_new0(struct lumi_engine_status, 1);
+    g_main_context_push_thread_default(made->context);
     made->server = soup_server_new("server-header", "lumid", "raw-paths", TRUE, NULL);
     LUMI_GOTO(code, out, load_certificate(made, error));
-    LUMI_GOTO(code, out, lumi_api_worker_create(&made->worker, error));
+    LUMI_GOTO(code, out, lumi_api_post_create(NULL, &made->to_engine, error));
+    LUMI_GOTO(code, out, lumi_api_post_create(made->context, &made->to_server, error));
+    LUMI_GOTO(code, out, lumi_api_worker_create(made->to_server, &made->worker, error));
     LUMI_GOTO(code, out, lumi_api_events_create(made, &made->events, error));
     made->guard = lumi_api_guard_create(made);
     soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
     soup_server_add_handler(made->server, NULL, on_request, made, NULL);
     LUMI_GOTO(code, out, listen_at(made, error));
     lumi_api_guard_listeners(made->guard);
-    *http = made;
-    made = NULL;
 out:
-    lumi_http_stop(made);
+    g_main_context_pop_thread_default(made->context);
+    return code;
+}
+
+int lumi_http_start(const struct lumi_http_options *options, struct lumi_http **http, struct lumi_error *error)
+{
+    struct lumi_http *made = g_new0(struct lumi_http, 1);
+
+    copy_options(made, options);
+    made->status = g_new0(struct lumi_engine_status, 1);
+    made->refusals = g_ptr_array_new();
+    made->context = g_main_context_new();
+    made->loop = g_main_loop_new(made->context, FALSE);
+    int code = make_server(made, error);
+    if (code == LUMI_OK)
+        code = start_thread(made, error);
+    if (code == LUMI_OK)
+        *http = made;
+    else
+        lumi_http_stop(made);
     return code;
 }
 
@@ -237,11 +384,23 @@ void lumi_http_stop(struct lumi_http *http)
 {
     if (!http)
         return;
+    if (http->running)
+        end_thread(http);
+    g_main_context_push_thread_default(http->context);
     lumi_api_worker_destroy(http->worker);
+    lumi_api_post_destroy(http->to_engine);
+    lumi_api_post_destroy(http->to_server);
     lumi_api_events_destroy(http->events);
     lumi_api_guard_destroy(http->guard);
+    lumi_api_refuse_finish(http);
     soup_server_disconnect(http->server);
     g_object_unref(http->server);
+    while (g_main_context_iteration(http->context, FALSE))
+        continue;
+    g_main_context_pop_thread_default(http->context);
+    g_main_loop_unref(http->loop);
+    g_main_context_unref(http->context);
+    g_ptr_array_unref(http->refusals);
     g_free(http->status);
     g_free((char *)http->options.listen);
     g_free((char *)http->options.token);

@@ -1,6 +1,8 @@
 /* The API: HTTP/JSON and server-sent events over the engine, described by daemon/http/openapi.json, which is served as
- * well (/openapi.json; docs/api.md). Runs in the thread of the GLib main loop that owns the engine. Errors are problem
- * documents (RFC 9457). */
+ * well (/openapi.json; docs/api.md). Errors are problem documents (RFC 9457).
+ *
+ * The server has a thread of its own; the engine is asked in that of the default GLib main loop, which owns it and
+ * calls everything below. So an emergency stop is heard and answered whatever holds the main loop up. */
 #ifndef LUMI_DAEMON_HTTP_API_SERVER_H
 #define LUMI_DAEMON_HTTP_API_SERVER_H
 
@@ -18,9 +20,12 @@ struct lumi_http_options {
     int connections_max;           /* of which connections_peer are kept for this computer (256) */
     int connections_peer;          /* of one address, or IPv6 network of 64 bits (64) */
     struct lumi_engine *engine;
-    struct lumi_handover *handover; /* may be NULL */
-    struct lumi_ingest *ingest;     /* may be NULL */
-    int64_t (*now_ns)(void *context);
+    struct lumi_handover *handover;   /* may be NULL */
+    struct lumi_ingest *ingest;       /* may be NULL */
+    int64_t (*now_ns)(void *context); /* in either thread */
+    /* Straight to the board, in the server's thread; the engine is told later. False: the board is away, it is stopped
+     * when it comes back. Never NULL. */
+    bool (*emergency_stop)(void *context);
     /* Cameras that are on this host, also those no configuration names (lumi_camera_list), and boards
      * (lumi_rig_usb_list); asked in a worker thread. Returns how many there are. May be NULL: none. */
     int (*devices)(void *context, struct lumi_camera_identity *cameras, int max, struct lumi_error *error);

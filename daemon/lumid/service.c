@@ -254,7 +254,6 @@ static int start_engine(struct lumi_service *service, struct lumi_error *error)
 {
     struct lumi_engine_config *config = g_new(struct lumi_engine_config, 1);
     struct lumi_engine_ports ports;
-    bool found = false;
 
     *config = service->config->engine;
     config->store.second_copy = service->config->second_copy[0] ? service->config->second_copy : NULL;
@@ -263,12 +262,19 @@ static int start_engine(struct lumi_service *service, struct lumi_error *error)
     config->utc_offset_ns = service->utc_offset_ns = lumi_service_utc_offset();
     lumi_service_ports(service, &ports);
     int code = lumi_engine_create(config, &ports, lumi_service_now(), &service->engine, error);
-    if (code == LUMI_OK)
-        code = lumi_engine_recover(service->engine, lumi_service_now(), &found, error);
-    if (code == LUMI_OK && found)
-        lumi_service_log(5, "a capture that was interrupted goes on");
     g_free(config);
     return code;
+}
+
+/* With a large capture this takes seconds. */
+static int recover(struct lumi_service *service, struct lumi_error *error)
+{
+    bool found = false;
+
+    LUMI_TRY(lumi_engine_recover(service->engine, lumi_service_now(), &found, error));
+    if (found)
+        lumi_service_log(5, "a capture that was interrupted goes on");
+    return LUMI_OK;
 }
 
 static int read_token(struct lumi_service *service, struct lumi_error *error)
@@ -295,6 +301,11 @@ static int64_t http_now(void *context)
     return lumi_service_now();
 }
 
+static bool http_emergency_stop(void *context)
+{
+    return lumi_service_stop_at_once(context);
+}
+
 static int http_devices(void *context, struct lumi_camera_identity *cameras, int max, struct lumi_error *error)
 {
     (void)context;
@@ -318,6 +329,7 @@ static int start_http(struct lumi_service *service, struct lumi_error *error)
     options.handover = service->handover;
     options.ingest = service->ingest;
     options.now_ns = http_now;
+    options.emergency_stop = http_emergency_stop;
     options.devices = http_devices;
     options.context = service;
     return lumi_http_start(&options, &service->http, error);
@@ -350,7 +362,8 @@ static int start_rig(struct lumi_service *service, struct lumi_error *error)
     LUMI_TRY(start_gpio(service, error));
     LUMI_TRY(start_cameras(service, error));
     LUMI_TRY(start_engine(service, error));
-    LUMI_TRY(start_http(service, error));
+    LUMI_TRY(start_http(service, error)); /* an emergency stop is heard from here on */
+    LUMI_TRY(recover(service, error));
     start_loop(service);
     return LUMI_OK;
 }

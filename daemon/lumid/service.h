@@ -3,7 +3,8 @@
  * 1. The loop's thread owns engine, API, handover and ingest. The link, every camera, the store's writers, the GPIO
  *    edges have threads of their own; requests to the board, judging, the drive and looking at the disk are tasks of
  *    pools (tasks.h). Everything comes back through one inbox.
- * 2. An emergency stop on a GPIO line goes from its own thread to the link, whatever the loop does.
+ * 2. An emergency stop goes from its own thread to the link, and to the drive, whatever the loop does: on a GPIO line
+ *    from that of the edges, over HTTP from the server's.
  * 3. One lumid a folder of captures: <folder>/.lumid/lock. */
 #ifndef LUMI_DAEMON_LUMID_SERVICE_H
 #define LUMI_DAEMON_LUMID_SERVICE_H

@@ -28,8 +28,9 @@ struct lumi_service {
     struct lumi_pool *requests; /* one thread: in order */
     struct lumi_pool *drives;   /* one thread */
     struct lumi_drive_map drive_map;
-    bool drive_busy; /* it takes the link's notices */
-    atomic_bool drive_cancel;
+    bool drive_busy;          /* it takes the link's notices */
+    atomic_bool drive_cancel; /* at the next position */
+    atomic_bool drive_stop;   /* now: an emergency stop */
     struct lumi_camera_host *hosts[LUMI_RIG_CAMERAS];
     struct lumi_gpio *gpio;
     int gpio_camera[LUMI_GPIO_LINES]; /* of SYNC and POWER lines, −1 all */
@@ -59,6 +60,9 @@ void lumi_service_rest(struct lumi_service *service);
 void lumi_service_drain(struct lumi_service *service);
 void lumi_service_tick(struct lumi_service *service);
 void lumi_service_measure(struct lumi_service *service, bool speed);
+/* An emergency stop, from any thread: to the board by the link's own, to the drive by the one that watches it. False:
+ * no board is there; it is stopped when it comes back. */
+bool lumi_service_stop_at_once(struct lumi_service *service);
 /* In the edge thread. */
 void lumi_service_estop(void *context, bool pressed, int64_t at_ns);
 

@@ -115,7 +115,7 @@ static void stored(void *context, const lumi_wire_Event *event)
 
 static void emergency_stop(void *context)
 {
-    lumi_rig_link_emergency_stop(((struct lumi_service *)context)->link);
+    lumi_service_stop_at_once(context);
 }
 
 static int64_t to_host(void *context, uint64_t board_ns)
@@ -166,6 +166,11 @@ static bool drive_cancelled(void *context)
     return atomic_load(&((struct lumi_service *)context)->drive_cancel);
 }
 
+static bool drive_stopped(void *context)
+{
+    return atomic_load(&((struct lumi_service *)context)->drive_stop);
+}
+
 /* One that knows where it is need not look for it again; of one that cannot tell, a sweep from the beginning does. */
 static int must_home(struct lumi_rig_drive *drive, uint32_t first_shot, bool *home, struct lumi_error *error)
 {
@@ -198,7 +203,8 @@ static void drive_work(struct lumi_task *task)
                                              .reset = asked->reset && service->drive_map.reset.used,
                                              .context = service,
                                              .notice = drive_notice,
-                                             .cancelled = drive_cancelled};
+                                             .cancelled = drive_cancelled,
+                                             .stopped = drive_stopped};
         asked->code = lumi_rig_drive_sweep(&sweep, &asked->error);
     }
     lumi_rig_drive_close(drive);
@@ -228,7 +234,9 @@ static void drive_sweep(void *context, uint32_t number, const struct lumi_rig *r
     asked->first_shot = first_shot;
     asked->states = g_memdup2(states, (size_t)lumi_plan_shots(plan));
     asked->reset = reset;
+    /* A stop that comes this moment is the board's already: it refuses to enable the drive. */
     atomic_store(&service->drive_cancel, false);
+    atomic_store(&service->drive_stop, false);
     service->drive_busy = true;
     give(service->drives, service, &asked->task, &asked->code, &asked->error);
 }

@@ -52,13 +52,21 @@ static void estop_done(struct lumi_task *task)
         lumi_engine_estop(told->service->engine, lumi_service_now(), told->pressed);
 }
 
+bool lumi_service_stop_at_once(struct lumi_service *service)
+{
+    bool sent = lumi_rig_link_emergency_stop(service->link);
+
+    atomic_store(&service->drive_stop, true);
+    return sent;
+}
+
 void lumi_service_estop(void *context, bool pressed, int64_t at_ns)
 {
     struct lumi_service *service = context;
 
     (void)at_ns;
     if (pressed)
-        lumi_rig_link_emergency_stop(service->link);
+        lumi_service_stop_at_once(service);
     struct estop_task *told = lumi_service_task(sizeof *told, NULL, estop_done);
     told->service = service;
     told->pressed = pressed;

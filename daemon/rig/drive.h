@@ -49,6 +49,9 @@ struct lumi_rig_drive_sweep {
     void (*notice)(void *context, const struct lumi_rig_notice *notice);
     /* Asked between positions; true: stops there, LUMI_ERR_CANCELLED. May be NULL. */
     bool (*cancelled)(void *context);
+    /* An emergency stop, asked at every look at a drive that moves, some fifty times a second; true: it is told to stop
+     * at once, whether or not the board is there to say so as well; LUMI_ERR_CANCELLED. May be NULL. */
+    bool (*stopped)(void *context);
     /* Filled in. */
     uint32_t fired, lost, next_shot;
 };

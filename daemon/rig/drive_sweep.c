@@ -76,6 +76,8 @@ static int judge(const struct watch *watch, struct lumi_error *error)
 {
     if (watch->faulted)
         return lumi_fail(error, LUMI_ERR_BUSY, "the board: %s", watch->fault);
+    if (watch->sweep->stopped && watch->sweep->stopped(watch->sweep->context))
+        return lumi_fail(error, LUMI_ERR_CANCELLED, "emergency stop");
     if (watch->restarted)
         return lumi_fail(error, LUMI_ERR_IO, "the board has started again in the middle of the sweep");
     return LUMI_OK;

@@ -23,6 +23,12 @@ static int64_t now_ns(void *context)
     return (int64_t)time.tv_sec * 1000000000 + time.tv_nsec;
 }
 
+static bool emergency_stop(void *context)
+{
+    (void)context;
+    return true;
+}
+
 static void tell(enum lumi_engine_tale kind, int shot, const char *text)
 {
     static uint64_t number;
@@ -112,6 +118,7 @@ int main(int argc, char **argv)
     options.certificate = argc > 4 ? argv[4] : NULL;
     options.engine = engine_double_engine();
     options.now_ns = now_ns;
+    options.emergency_stop = emergency_stop;
     if (lumi_http_start(&options, &http, &error) != LUMI_OK) {
         fprintf(stderr, "serve_api: %s\n", error.text);
         return 1;

@@ -1,4 +1,5 @@
-/* A server over the engine's double, and a client that is a bare socket: one thread, no waiting but for bytes. */
+/* A server over the engine's double, and a client that is a bare socket in the engine's thread: no waiting but for
+ * bytes. */
 #ifndef LUMI_TESTS_UNIT_API_FIXTURE_H
 #define LUMI_TESTS_UNIT_API_FIXTURE_H
 
@@ -21,12 +22,20 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-static int64_t fixture_time;
+static _Atomic int64_t fixture_time;
+static _Atomic int fixture_stops; /* that have gone to the board */
 
 static int64_t fixture_now(void *context)
 {
     (void)context;
     return fixture_time;
+}
+
+static inline bool fixture_stop(void *context)
+{
+    (void)context;
+    fixture_stops++;
+    return true;
 }
 
 struct fixture {
@@ -43,6 +52,8 @@ static inline void fixture_options(struct fixture *fixture)
     fixture->options.handover = engine_double_handover();
     fixture->options.ingest = engine_double_ingest();
     fixture->options.now_ns = fixture_now;
+    fixture->options.emergency_stop = fixture_stop;
+    fixture_stops = 0;
 }
 
 static inline void fixture_start(struct fixture *fixture)
@@ -188,6 +199,15 @@ static inline struct answer fixture_ask(const struct fixture *fixture, const cha
     answer = answer_of(fixture_receive(fd, NULL));
     close(fd);
     return answer;
+}
+
+/* The server has done all that was given to it before: connections are accepted and letters read in their order. */
+static inline void fixture_settle(const struct fixture *fixture)
+{
+    struct answer answer = fixture_ask(fixture, "GET", "/api/v1/capture", NULL, NULL);
+
+    assert_int_equal(answer.status, 200);
+    answer_clear(&answer);
 }
 
 #define JSON_TYPE "Content-Type: application/json\r\n"

@@ -128,12 +128,13 @@ static void who_says_nothing_is_hung_up_on(void **state)
     int idle = connect_as(*state, 2), slow = connect_as(*state, 2), kept = connect_as(*state, 2), late;
 
     fixture_send(slow, part, strlen(part));
-    turn_the_loop();
+    fixture_settle(*state);
     fixture_time += 20 * SECOND;
     ask_on(kept, "/api/v1/capture");
     expect_answer(kept, 200);
     fixture_send(slow, "a", 1); /* a byte now and then does not help */
     late = connect_as(*state, 2);
+    fixture_settle(*state);
     fixture_time += 20 * SECOND;
     expect_end(idle);
     g_string_free(fixture_receive(slow, NULL), TRUE); /* ends */
@@ -155,6 +156,7 @@ static void who_listens_to_events_may_be_silent(void **state)
 
     ask_on(listener, "/api/v1/events");
     g_string_free(fixture_receive(listener, "event: progress"), TRUE);
+    fixture_settle(fixture);
     fixture_time += 3600 * SECOND;
     expect_end(idle); /* what was to be looked at has been looked at */
     lumi_http_told(fixture->http, &told);

@@ -152,6 +152,7 @@ static void who_sleeps_costs_nothing_and_is_told_what_it_missed(void **state)
     int fd = listen_and_sleep(fixture);
 
     tell(fixture, "last");
+    fixture_settle(fixture);
     /* What the socket's buffers held comes first, then the gap, then the newest 2048. */
     got = fixture_receive(fd, "last");
     assert_int_equal(count(got->str, "event: gap"), 1);
@@ -168,6 +169,7 @@ static void who_takes_nothing_for_a_minute_is_hung_up_on(void **state)
     struct fixture *fixture = *state;
     int fd = listen_and_sleep(fixture);
 
+    fixture_settle(fixture);
     fixture_time += 61 * 1000000000LL;
     for (int i = 0; i < 250; i++) /* until it is noticed: every half second */
         fixture_wait();

@@ -435,6 +435,41 @@ static void a_sweep_can_be_stopped_between_positions(void **state)
     end_sweep(&sweep);
 }
 
+struct stop_here {
+    int looks, moves;
+};
+
+/* While it moves for the third time. */
+static bool in_the_third_move(void *context)
+{
+    struct stop_here *stop = context;
+
+    pthread_mutex_lock(&fake.lock);
+    stop->moves = fake.moves;
+    pthread_mutex_unlock(&fake.lock);
+    stop->looks += stop->moves == 3;
+    return stop->looks > 1;
+}
+
+/* The board says nothing at all of it: its link may be cut. */
+static void an_emergency_stop_of_the_host_stops_a_drive_that_moves(void **state)
+{
+    struct lumi_rig_drive_sweep sweep;
+    struct lumi_error error = {0};
+    struct stop_here stop = {0};
+
+    (void)state;
+    start_sweep(&sweep);
+    sweep.context = &stop;
+    sweep.stopped = in_the_third_move;
+    assert_int_equal(lumi_rig_drive_sweep(&sweep, &error), LUMI_ERR_CANCELLED);
+    assert_string_equal(error.text, "emergency stop");
+    assert_int_equal(fired_count, 4);
+    assert_int_equal(fake.moves, 3);
+    assert_int_equal(fake.stops, 1);
+    end_sweep(&sweep);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -452,6 +487,7 @@ int main(void)
         cmocka_unit_test(an_alarm_from_before_is_reset_on_the_operators_word_only),
         cmocka_unit_test(only_start_stop_and_only_rigs_with_such_a_drive),
         cmocka_unit_test(a_sweep_can_be_stopped_between_positions),
+        cmocka_unit_test(an_emergency_stop_of_the_host_stops_a_drive_that_moves),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
