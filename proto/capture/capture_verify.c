@@ -372,12 +372,19 @@ static bool live_file(const char *path)
     return false;
 }
 
+/* A frame that nobody was told is stored: being written, or left by a crash for the next who opens the capture for
+ * writing. */
+static bool unclaimed_file(const struct check *check, const char *path)
+{
+    return !check->result->sealed && !strncmp(path, CAPTURE_FRAMES "/", strlen(CAPTURE_FRAMES) + 1);
+}
+
 static int check_item(struct check *check, const struct item *item)
 {
     char hex[65];
     struct lumi_error local;
 
-    if (!item->tag && !item->in_row && !live_file(item->path))
+    if (!item->tag && !item->in_row && !live_file(item->path) && !unclaimed_file(check, item->path))
         report(check, item->path, "belongs to no frame");
     if (check->result->sealed && !item->in_manifest)
         report(check, item->path, "is not in the manifest");

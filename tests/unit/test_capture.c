@@ -363,6 +363,24 @@ static void verify_finds_and_names_every_kind_of_damage(void **state)
     damage(state, "ln -s /etc/passwd data/frames/link.jpg", "data/frames/link.jpg: is no plain file");
 }
 
+/* As after a power cut, before the next lumid has opened it for writing; what has a row is looked at as ever. */
+static void what_a_crash_left_in_an_open_capture_is_no_damage(void **state)
+{
+    struct lumi_capture *capture;
+    struct lumi_verify_result result;
+
+    OK(lumi_capture_create_live(in_scratch(state, "a"), &capture, error));
+    store_frame(capture, add_camera(capture, "c"), "f000", 0);
+    lumi_capture_close(capture);
+    shell("cd '%s' && printf x >.s7.tmp && printf x >s6.jpg", in_scratch(state, "a/data/frames"));
+    OK(lumi_capture_verify(in_scratch(state, "a"), collect, NULL, NULL, &result, error));
+    assert_int_equal(result.problems, 0);
+    assert_int_equal(result.files, 1);
+    shell("printf x >>'%s'", in_scratch(state, "a/data/frames/f000.jpg"));
+    OK(lumi_capture_verify(in_scratch(state, "a"), collect, NULL, NULL, &result, error));
+    assert_int_equal(result.problems, 1);
+}
+
 static void a_newer_capture_and_a_stranger_are_refused(void **state)
 {
     struct lumi_capture *capture;
@@ -454,6 +472,7 @@ int main(void)
         TEST(a_sealed_capture_is_opened_for_a_retake_and_sealed_again),
         TEST(a_copied_capture_is_whole),
         TEST(verify_finds_and_names_every_kind_of_damage),
+        TEST(what_a_crash_left_in_an_open_capture_is_no_damage),
         TEST(a_newer_capture_and_a_stranger_are_refused),
         TEST(a_database_that_leads_outside_the_capture_is_refused),
         TEST(versions_are_upgraded_one_at_a_time_or_not_at_all),
