@@ -1,7 +1,8 @@
 /* The thread that waits for edges, and the queue they wait in.
  *
  * 1. An emergency stop is looked at before everything else that has come, and told in this thread.
- * 2. A line of an emergency stop that cannot be read any more (its chip is gone) counts as pressed. */
+ * 2. A line of an emergency stop that cannot be read any more (its chip is gone) counts as pressed, until the chip is
+ * back and the line says otherwise. */
 #include "daemon/gpio/gpio.h"
 
 #include "daemon/gpio/gpio_lines.h"
@@ -19,10 +20,13 @@
 
 #define QUEUE 4096 /* edges that wait to be taken; more are counted as lost */
 #define PRIORITY 50
+#define AGAIN_MS 500 /* how often a chip that is gone is looked for */
 
 struct lumi_gpio {
     struct lumi_gpio_line lines[LUMI_GPIO_LINES];
     struct lumi_gpio_held *held[LUMI_GPIO_LINES];
+    pthread_mutex_t holding; /* held and wanted, once the thread runs; it reads held of its inputs without */
+    bool wanted[LUMI_GPIO_LINES];
     bool gone[LUMI_GPIO_LINES], pressed[LUMI_GPIO_LINES]; /* of the thread's own */
     int count, order[LUMI_GPIO_LINES], inputs;            /* emergency stops first */
     struct lumi_gpio_options options;
@@ -91,6 +95,8 @@ static bool take_line(struct lumi_gpio *gpio, int line)
         gpio->gone[line] = true;
         if (estop)
             press(gpio, line, true, now_ns());
+        if (gpio->options.gone)
+            gpio->options.gone(gpio->options.context, line, true);
         return false;
     }
     for (int i = 0; i < count; i++) {
@@ -105,6 +111,57 @@ static bool take_line(struct lumi_gpio *gpio, int line)
     return count > 0;
 }
 
+static bool hold_again(struct lumi_gpio *gpio, int line)
+{
+    struct lumi_gpio_held *made;
+    struct lumi_error error;
+
+    if (lumi_gpio_hold(&gpio->lines[line], &made, &error) != LUMI_OK)
+        return false;
+    lumi_gpio_release(gpio->held[line]);
+    gpio->held[line] = made;
+    return true;
+}
+
+static bool is_output(const struct lumi_gpio_line *line)
+{
+    return line->role == LUMI_GPIO_LAMP || line->role == LUMI_GPIO_POWER;
+}
+
+/* An input's chip may be back, and its outputs with it, which a new chip has switched off. */
+static void look_again(struct lumi_gpio *gpio, int line)
+{
+    pthread_mutex_lock(&gpio->holding);
+    bool back = hold_again(gpio, line);
+    for (int i = 0; i < gpio->count && back; i++)
+        if (is_output(&gpio->lines[i]) && strcmp(gpio->lines[i].chip, gpio->lines[line].chip) == 0 &&
+            hold_again(gpio, i))
+            lumi_gpio_held_set(gpio->held[i], gpio->wanted[i]);
+    pthread_mutex_unlock(&gpio->holding);
+    if (!back)
+        return;
+    gpio->gone[line] = false;
+    if (gpio->options.gone)
+        gpio->options.gone(gpio->options.context, line, false);
+    if (gpio->lines[line].role == LUMI_GPIO_ESTOP && lumi_gpio_held_get(gpio->held[line]) == 0)
+        press(gpio, line, false, now_ns());
+}
+
+static int wait_for_edges(struct lumi_gpio *gpio, struct pollfd *fds)
+{
+    bool gone = false;
+
+    for (int i = 0; i < gpio->inputs; i++) {
+        int line = gpio->order[i];
+        if (gpio->gone[line])
+            look_again(gpio, line);
+        gone = gone || gpio->gone[line];
+        fds[i] = (struct pollfd){.fd = gpio->gone[line] ? -1 : lumi_gpio_held_fd(gpio->held[line]), .events = POLLIN};
+    }
+    fds[gpio->inputs] = (struct pollfd){.fd = gpio->stop, .events = POLLIN};
+    return poll(fds, (nfds_t)gpio->inputs + 1, gone ? AGAIN_MS : -1);
+}
+
 static void *edges(void *context)
 {
     struct lumi_gpio *gpio = context;
@@ -115,12 +172,7 @@ static void *edges(void *context)
             press(gpio, gpio->order[i], true, now_ns());
     for (;;) {
         bool any = false;
-        for (int i = 0; i < gpio->inputs; i++)
-            fds[i] =
-                (struct pollfd){.fd = gpio->gone[gpio->order[i]] ? -1 : lumi_gpio_held_fd(gpio->held[gpio->order[i]]),
-                                .events = POLLIN};
-        fds[gpio->inputs] = (struct pollfd){.fd = gpio->stop, .events = POLLIN};
-        if (poll(fds, (nfds_t)gpio->inputs + 1, -1) < 0 && errno != EINTR)
+        if (wait_for_edges(gpio, fds) < 0 && errno != EINTR)
             break;
         if (fds[gpio->inputs].revents)
             break;
@@ -166,6 +218,7 @@ int lumi_gpio_open(const struct lumi_gpio_line *lines, int count, const struct l
     made->options = *options;
     made->stop = -1;
     pthread_mutex_init(&made->lock, NULL);
+    pthread_mutex_init(&made->holding, NULL);
     for (int i = 0; i < count && code == LUMI_OK; i++) {
         made->lines[i] = lines[i];
         code = lumi_gpio_hold(&lines[i], &made->held[i], error);
@@ -189,13 +242,14 @@ void lumi_gpio_close(struct lumi_gpio *gpio)
     if (gpio->running && write(gpio->stop, &one, sizeof one) == sizeof one)
         pthread_join(gpio->thread, NULL);
     for (int i = 0; i < gpio->count; i++) {
-        if (gpio->lines[i].role == LUMI_GPIO_LAMP || gpio->lines[i].role == LUMI_GPIO_POWER)
+        if (is_output(&gpio->lines[i]))
             lumi_gpio_held_set(gpio->held[i], false);
         lumi_gpio_release(gpio->held[i]);
     }
     if (gpio->stop >= 0)
         close(gpio->stop);
     pthread_mutex_destroy(&gpio->lock);
+    pthread_mutex_destroy(&gpio->holding);
     free(gpio);
 }
 
@@ -216,17 +270,26 @@ int lumi_gpio_set(struct lumi_gpio *gpio, int line, bool active, struct lumi_err
 {
     char text[160];
 
-    if (lumi_gpio_held_set(gpio->held[line], active) == 0)
+    pthread_mutex_lock(&gpio->holding);
+    gpio->wanted[line] = active;
+    bool set = lumi_gpio_held_set(gpio->held[line], active) == 0;
+    int saved = errno;
+    if (!set && hold_again(gpio, line)) /* its chip was gone, and is back */
+        set = lumi_gpio_held_set(gpio->held[line], active) == 0;
+    pthread_mutex_unlock(&gpio->holding);
+    if (set)
         return LUMI_OK;
     lumi_gpio_line_text(&gpio->lines[line], text, sizeof text);
-    return lumi_fail(error, LUMI_ERR_IO, "%s: it cannot be set: %s", text, strerror(errno));
+    return lumi_fail(error, LUMI_ERR_IO, "%s: it cannot be set: %s", text, strerror(saved));
 }
 
 int lumi_gpio_get(struct lumi_gpio *gpio, int line, bool *active, struct lumi_error *error)
 {
-    int value = lumi_gpio_held_get(gpio->held[line]);
     char text[160];
 
+    pthread_mutex_lock(&gpio->holding);
+    int value = lumi_gpio_held_get(gpio->held[line]);
+    pthread_mutex_unlock(&gpio->holding);
     if (value >= 0) {
         *active = value > 0;
         return LUMI_OK;

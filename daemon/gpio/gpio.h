@@ -7,6 +7,7 @@
 #include "proto/base/result.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #define LUMI_GPIO_LINES 32
@@ -34,10 +35,12 @@ struct lumi_gpio;
 struct lumi_gpio_options {
     void (*estop)(void *context, bool pressed, int64_t at_ns); /* in the edge thread: at once */
     void (*wake)(void *context);                               /* edges wait to be taken */
+    void (*gone)(void *context, int line, bool gone);          /* an input's chip, in the edge thread; NULL: not told */
     void *context;
 };
 /* Asks for the lines. LUMI_ERR_NOTFOUND (no such chip or line), LUMI_ERR_BUSY (somebody's), each naming the line. An
- * e-stop that is pressed already is reported at once; one whose chip goes away counts as pressed. */
+ * e-stop that is pressed already is reported at once; one whose chip goes away counts as pressed. A chip that comes
+ * back is taken again, outputs as they were; then an e-stop is what its line says. Edges in between are not told. */
 int lumi_gpio_open(const struct lumi_gpio_line *lines, int count, const struct lumi_gpio_options *options,
                    struct lumi_gpio **gpio, struct lumi_error *error);
 void lumi_gpio_close(struct lumi_gpio *gpio);                             /* outputs go inactive; NULL is fine */
@@ -45,6 +48,8 @@ bool lumi_gpio_edge(struct lumi_gpio *gpio, struct lumi_gpio_edge *edge); /* the
 int lumi_gpio_set(struct lumi_gpio *gpio, int line, bool active, struct lumi_error *error);
 /* Of an input; reads it. */
 int lumi_gpio_get(struct lumi_gpio *gpio, int line, bool *active, struct lumi_error *error);
+/* "GPIO gpiochip0:5 (emergency stop)", for messages. */
+void lumi_gpio_line_text(const struct lumi_gpio_line *line, char *text, size_t size);
 /* "libgpiod 2.2.1" */
 const char *lumi_gpio_library(void);
 

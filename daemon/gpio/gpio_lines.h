@@ -16,9 +16,6 @@ struct lumi_gpio_event {
     uint32_t lost; /* before it, of this line */
 };
 
-/* "gpiochip0 line 5", for messages. */
-void lumi_gpio_line_text(const struct lumi_gpio_line *line, char *text, size_t size);
-
 /* ESTOP and SYNC: an input with both edges; LAMP and POWER: an output, inactive. */
 int lumi_gpio_hold(const struct lumi_gpio_line *line, struct lumi_gpio_held **held, struct lumi_error *error);
 void lumi_gpio_release(struct lumi_gpio_held *held);

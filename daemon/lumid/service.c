@@ -221,7 +221,8 @@ static void wake(void *context)
 static int start_gpio(struct lumi_service *service, struct lumi_error *error)
 {
     const struct lumi_config *config = service->config;
-    const struct lumi_gpio_options options = {.estop = lumi_service_estop, .wake = wake, .context = service};
+    const struct lumi_gpio_options options = {
+        .estop = lumi_service_estop, .wake = wake, .gone = lumi_service_chip, .context = service};
 
     for (int i = 0; i < config->gpio_count; i++) {
         service->gpio_camera[i] = -1;

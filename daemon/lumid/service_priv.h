@@ -65,5 +65,6 @@ void lumi_service_measure(struct lumi_service *service, bool speed);
 bool lumi_service_stop_at_once(struct lumi_service *service);
 /* In the edge thread. */
 void lumi_service_estop(void *context, bool pressed, int64_t at_ns);
+void lumi_service_chip(void *context, int line, bool gone);
 
 #endif

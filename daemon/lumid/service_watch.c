@@ -73,6 +73,39 @@ void lumi_service_estop(void *context, bool pressed, int64_t at_ns)
     lumi_inbox_post(service->inbox, &told->task);
 }
 
+struct chip_task {
+    struct lumi_task task;
+    struct lumi_service *service;
+    int line;
+    bool gone;
+};
+
+static void chip_done(struct lumi_task *task)
+{
+    struct chip_task *told = (struct chip_task *)task;
+    const struct lumi_gpio_line *line = &told->service->config->gpio[told->line];
+    char text[160];
+
+    lumi_gpio_line_text(line, text, sizeof text);
+    if (!told->gone)
+        lumi_service_log(6, "%s: its chip is back", text);
+    else if (line->role == LUMI_GPIO_ESTOP)
+        lumi_service_log(3, "%s: its chip is gone; that counts as pressed", text);
+    else
+        lumi_service_log(4, "%s: its chip is gone", text);
+}
+
+void lumi_service_chip(void *context, int line, bool gone)
+{
+    struct lumi_service *service = context;
+    struct chip_task *told = lumi_service_task(sizeof *told, NULL, chip_done);
+
+    told->service = service;
+    told->line = line;
+    told->gone = gone;
+    lumi_inbox_post(service->inbox, &told->task);
+}
+
 /* ---- notices ---- */
 
 static bool drain_link(struct lumi_service *service)

@@ -1,8 +1,10 @@
 /* daemon/gpio on the kernel's simulated chip (gpio-sim): every edge with its time, an emergency stop from its thread,
  * outputs, lines that cannot be had, a chip that goes away.
- * usage: gpio_chip LABEL FOLDER LIVE   (FOLDER: the chip's in sysfs with sim_gpioN/pull; LIVE: what takes it away) */
+ * usage: gpio_chip LABEL FOLDER LIVE   (FOLDER: the device's in sysfs with gpiochipM/sim_gpioN/pull; LIVE: what takes
+ * the chip away, which comes back with another M) */
 #include "daemon/gpio/gpio.h"
 
+#include <glob.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,11 +46,22 @@ static void put(const char *path, const char *text)
     }
 }
 
+static void find(int line, const char *what, char *path, size_t size)
+{
+    glob_t found;
+
+    snprintf(path, size, "%s/gpiochip*/sim_gpio%d/%s", folder, line, what);
+    if (glob(path, 0, NULL, &found) == 0) {
+        snprintf(path, size, "%s", found.gl_pathv[0]);
+        globfree(&found);
+    }
+}
+
 static void pull(int line, bool up)
 {
     char path[512];
 
-    snprintf(path, sizeof path, "%s/sim_gpio%d/pull", folder, line);
+    find(line, "pull", path, sizeof path);
     put(path, up ? "pull-up" : "pull-down");
 }
 
@@ -56,7 +69,7 @@ static int value(int line)
 {
     char path[512], text[8] = "";
 
-    snprintf(path, sizeof path, "%s/sim_gpio%d/value", folder, line);
+    find(line, "value", path, sizeof path);
     FILE *file = fopen(path, "r");
     if (file) {
         if (!fgets(text, sizeof text, file))
@@ -84,6 +97,16 @@ static bool await(const int *count, int wanted)
         bool done = *count >= wanted;
         pthread_mutex_unlock(&stop.lock);
         if (done)
+            return true;
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    }
+    return false;
+}
+
+static bool await_high(int line)
+{
+    for (int i = 0; i < PATIENCE_MS; i++) {
+        if (value(line) == 1)
             return true;
         nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
     }
@@ -150,6 +173,22 @@ static void refusals(const struct lumi_gpio_line *lines, const struct lumi_gpio_
     check(lumi_gpio_open(&other, 1, options, &gpio, &error) == LUMI_ERR_NOTFOUND, error.text);
 }
 
+static void comes_back(struct lumi_gpio *gpio, const char *live)
+{
+    struct lumi_error error = {0};
+
+    stop.presses = stop.releases = 0;
+    put(live, "0");
+    check(await(&stop.presses, 1), "an emergency stop whose chip is gone counts as pressed");
+    check(lumi_gpio_set(gpio, 2, true, &error) != LUMI_OK, error.text);
+    put(live, "1");
+    pull(0, true); /* nobody holds a new chip's line up */
+    check(await(&stop.releases, 1), "until the chip is back and nobody presses it");
+    check(await_high(2), "an output is again as it was");
+    pull(0, false);
+    check(await(&stop.presses, 2), "and the next press is told");
+}
+
 int main(int argc, char **argv)
 {
     struct lumi_gpio_line lines[] = {
@@ -182,9 +221,8 @@ int main(int argc, char **argv)
           "one that is pressed from the beginning is told");
     pull(0, true);
     check(await(&stop.releases, 2), "and released");
-    stop.presses = 0;
-    put(argv[3], "0");
-    check(await(&stop.presses, 1), "an emergency stop whose chip is gone counts as pressed");
+    check(lumi_gpio_set(gpio, 2, true, &error) == LUMI_OK, "the lamp is switched on");
+    comes_back(gpio, argv[3]);
     lumi_gpio_close(gpio);
     return 0;
 }

@@ -10,5 +10,4 @@ echo rig >$config/bank0/label
 echo ESTOP >$config/bank0/line0/name
 echo EXPSYNC >$config/bank0/line1/name
 echo 1 >$config/live
-"$LUMI_BUILD/tests/hardware/gpio_chip" rig \
-    "/sys/devices/platform/$(cat $config/dev_name)/$(cat $config/bank0/chip_name)" $config/live
+"$LUMI_BUILD/tests/hardware/gpio_chip" rig "/sys/devices/platform/$(cat $config/dev_name)" $config/live

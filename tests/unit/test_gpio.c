@@ -200,6 +200,22 @@ static void edge(int offset, bool active, int64_t at_ns, bool told)
     pthread_mutex_unlock(&lock);
 }
 
+/* The chip goes and nobody can have the line; a new one comes, with everything off. */
+static void unplug(int offset)
+{
+    pthread_mutex_lock(&lock);
+    close(lines[offset].far);
+    lines[offset].far = -1;
+    pthread_mutex_unlock(&lock);
+}
+
+static void plug(int offset)
+{
+    pthread_mutex_lock(&lock);
+    lines[offset].held = lines[offset].value = false;
+    pthread_mutex_unlock(&lock);
+}
+
 /* ---- who listens ---- */
 
 static struct heard {
@@ -393,9 +409,28 @@ static void an_emergency_stop_whose_chip_goes_away_counts_as_pressed(void **stat
     struct lumi_gpio *gpio = open_lines(&estop, 1);
 
     (void)state;
-    close(lines[3].far);
-    lines[3].far = -1;
+    unplug(3);
     await(&heard.presses, 1);
+    lumi_gpio_close(gpio);
+}
+
+static void a_chip_that_comes_back_is_taken_again_and_its_outputs_are_as_they_were(void **state)
+{
+    const struct lumi_gpio_line both[] = {lamp, estop};
+    struct lumi_gpio *gpio = open_lines(both, 2);
+    struct lumi_error error = {0};
+
+    (void)state;
+    assert_int_equal(lumi_gpio_set(gpio, 0, true, &error), LUMI_OK);
+    unplug(3);
+    await(&heard.presses, 1);
+    assert_int_equal(heard.releases, 0);
+    plug(6);
+    plug(3);
+    await(&heard.releases, 1);
+    assert_true(lines[6].held && lines[6].value);
+    edge(3, true, now_ns(), true);
+    await(&heard.presses, 2);
     lumi_gpio_close(gpio);
 }
 
@@ -485,6 +520,7 @@ int main(void)
         TEST(one_that_is_pressed_already_is_told_at_once),
         TEST(what_the_line_says_counts_where_edges_are_lost),
         TEST(an_emergency_stop_whose_chip_goes_away_counts_as_pressed),
+        TEST(a_chip_that_comes_back_is_taken_again_and_its_outputs_are_as_they_were),
         TEST(outputs_are_switched_and_left_inactive),
         TEST(polarity_and_debouncing_are_asked_of_the_kernel),
         TEST(a_chip_is_found_by_its_label),
