@@ -417,7 +417,9 @@ static void say_ready(struct lumi_service *service, const char *ingest)
         lumi_service_log(6, "lumid %s: ready, port %d, %d cameras, captures in %s", LUMI_VERSION,
                          lumi_http_port(service->http), service->config->engine.camera_count,
                          service->config->engine.folder);
-    sd_notify(0, "READY=1");
+    if (service->engine)
+        lumi_engine_status(service->engine, service->status);
+    sd_notifyf(0, "READY=1\nSTATUS=%s", service->engine ? lumi_engine_state_name(service->status->state) : "taking in");
 }
 
 int lumi_service_run(const struct lumi_service_options *options, struct lumi_error *error)
