@@ -49,7 +49,7 @@ boot() {
     rm -f "$work/status"
     : >"$work/console"
     # shellcheck disable=SC2086
-    nice qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m 2048 -nographic -no-reboot -nodefaults \
+    qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m 2048 -nographic -no-reboot -nodefaults \
         -serial stdio -kernel "$cache/kernel" -initrd "$cache/initrd" \
         -append "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off no_timer_check net.ifnames=0 lumi.script=$script $words" \
         -fsdev "local,id=root,path=$cache/root,security_model=none,readonly=on,multidevs=remap" \

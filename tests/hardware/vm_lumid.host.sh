@@ -3,7 +3,9 @@
 # shellcheck disable=SC2154
 [ -r "${LUMI_IMAGE:-}" ] || { echo "skipped: no image of the firmware: the cross compiler or nanopb's source is missing"; exit 77; }
 [ -x "${LUMI_UVC_DEVICE:-}" ] || { echo "skipped: libusbredirparser is missing"; exit 77; }
-"$LUMI_BOARD_REDIR" "$LUMI_IMAGE" "$work/board" >"$work/redir" 2>&1 &
+: >"$work/redir"
+# It takes a whole core where it gets one, and is content with less.
+nice -n 12 "$LUMI_BOARD_REDIR" "$LUMI_IMAGE" "$work/board" >"$work/redir" 2>&1 &
 redir=$!
 "$LUMI_UVC_DEVICE" "$work/camera" LUMI-UVC-1 20 >"$work/uvc" 2>&1 &
 uvc=$!

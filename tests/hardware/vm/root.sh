@@ -19,7 +19,7 @@ for tool in qemu-system-x86_64 mmdebstrap; do
 done
 
 packages="$("$source/script/bootstrap" list build | grep -v -e arm-none-eabi),libcmocka-dev,libusbredirparser-dev,libcamera-ipa"
-packages="$(echo "$packages" | tr '\n' ',' | sed 's/,,*/,/g'),usbutils,kmod,udev,busybox-static,gpiod,v4l-utils,iproute2,xz-utils"
+packages="$(echo "$packages" | tr '\n' ',' | sed 's/,,*/,/g'),usbutils,kmod,udev,busybox-static,gpiod,v4l-utils,iproute2,xz-utils,dpkg-dev,file,systemd-sysv"
 wanted=$(cat "$0" && echo "$packages $mirror")
 root=$cache/root
 if [ -e "$cache/made" ] && [ "$(cat "$cache/made")" = "$wanted" ]; then

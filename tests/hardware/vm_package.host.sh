@@ -1,0 +1,3 @@
+# shellcheck shell=sh
+# The board and the USB camera.
+. "$here/vm_lumid.host.sh"
