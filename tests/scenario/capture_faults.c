@@ -88,10 +88,23 @@ static void no_bad_day_loses_mixes_or_doubles_a_frame(void **state)
     assert_int_equal(bad, 0);
 }
 
+/* Found by more of them than every run has. */
+static void what_went_wrong_once_does_not_again(void **state)
+{
+    static const int regressions[] = {
+        2835, /* a camera that went and came while the daemon hung */
+    };
+
+    (void)state;
+    for (size_t i = 0; i < sizeof regressions / sizeof regressions[0]; i++)
+        assert_true(one_day(regressions[i]));
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_bad_day_loses_mixes_or_doubles_a_frame),
+        cmocka_unit_test(what_went_wrong_once_does_not_again),
     };
     const char *count = getenv("LUMI_FAULTS_COUNT");
 

@@ -361,8 +361,9 @@ static void serve(struct world *w)
     if (!w->engine || w->hanging)
         return;
     world_board_service(w);
-    world_cameras_service(w);
-    dispatch(w);
+    dispatch(w); /* before a camera comes, so that after a hang its going is told first */
+    if (!w->killed_inside)
+        world_cameras_service(w);
     world_disk_service(w);
     if (!w->killed_inside && lumi_engine_next(w->engine) <= w->now_ns)
         lumi_engine_run(w->engine, w->now_ns);
