@@ -1,2 +1,3 @@
 add_test(NAME lumid_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/lumid_test.sh $<TARGET_FILE:lumid> $<TARGET_FILE:lumi>)
-set_tests_properties(lumid_test PROPERTIES TIMEOUT 600 LABELS slow)
+set_tests_properties(lumid_test PROPERTIES TIMEOUT 600)
+lumi_sanitized(lumid_test)

@@ -119,7 +119,7 @@ need_network
 rm -rf lumid_kill_test.tmp
 mkdir lumid_kill_test.tmp
 cd lumid_kill_test.tmp
-"$lumi" sim rig object --rig arc:2x10:0.2 --size 32x32 -o rig --seed 5 --position-time 1.2 --patience 60 --port 8483 \
+"$lumi" sim rig object --rig arc:2x10:0.2 --size 32x32 -o rig --seed 5 --position-time 1.6 --patience 60 --port 8483 \
     --own-network -- sh "$here/lumid_kill_test.sh" "$lumi" "$lumid" "$capture_kept" "$kills" operate ||
     fail "the rig ended badly"
 for capture in rig/captures/take-*; do
