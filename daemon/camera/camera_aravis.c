@@ -381,8 +381,12 @@ static int open_found(const struct lumi_camera_identity *found, struct aravis_ca
 {
     const char *name = found->serial[0] ? found->serial : found->address;
     g_autoptr(GError) problem = NULL;
-    ArvDevice *device = aravis_device_open(found, &problem);
+    ArvDevice *device;
 
+    camera->event = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC); /* before there are threads that write to it */
+    if (camera->event < 0)
+        return lumi_fail_errno(error, name, "an event descriptor");
+    device = aravis_device_open(found, &problem);
     if (!device)
         return lumi_fail(error, LUMI_ERR_NOTFOUND, "camera %s: %s", name, problem ? problem->message : "not there");
     if (ARV_IS_GV_DEVICE(device) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device))) {
@@ -393,9 +397,6 @@ static int open_found(const struct lumi_camera_identity *found, struct aravis_ca
     g_object_unref(device);
     if (!camera->camera)
         return lumi_fail(error, LUMI_ERR_IO, "camera %s: %s", name, problem ? problem->message : "cannot be opened");
-    camera->event = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-    if (camera->event < 0)
-        return lumi_fail_errno(error, name, "an event descriptor");
     g_signal_connect(device, "control-lost", G_CALLBACK(on_lost), camera);
     aravis_identify(camera);
     return LUMI_OK;

@@ -11,9 +11,12 @@ target_link_libraries(capture_sweeps PRIVATE capture_world lumi_engine)
 # Five hundred bad days; under sanitizers fewer, more only in `script/test all`.
 lumi_test(capture_faults FOLDERS engine)
 target_link_libraries(capture_faults PRIVATE capture_world lumi_engine)
-if(LUMI_SANITIZE)
+if(LUMI_SANITIZE STREQUAL thread)
+  set_tests_properties(capture_faults PROPERTIES ENVIRONMENT LUMI_FAULTS_COUNT=20)
+elseif(LUMI_SANITIZE)
   set_tests_properties(capture_faults PROPERTIES ENVIRONMENT LUMI_FAULTS_COUNT=60)
 endif()
+lumi_sanitized(capture_sweeps capture_faults)
 add_test(NAME capture_faults_many COMMAND capture_faults 5000 1001)
 set_tests_properties(capture_faults_many PROPERTIES LABELS "long;slow" TIMEOUT 3000)
 

@@ -25,7 +25,7 @@
 struct world {
     struct sim_gige *gige;
     atomic_int fired;
-    double exposures[8]; /* s, as they were set */
+    _Atomic double exposures[8]; /* s, as they were set */
 };
 
 static uint64_t now_ns(void *context)
