@@ -8,8 +8,9 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#define BUFFERS 8        /* of the pool, where the setting does not say */
-#define STREAM_BUFFERS 4 /* that packets are put into; a frame is copied out of them as it comes */
+#define BUFFERS 8         /* of the pool, where the setting does not say */
+#define LEAVE_ROUNDS 5000 /* of a millisecond: far more than it takes to be told that a camera is lost */
+#define STREAM_BUFFERS 4  /* that packets are put into; a frame is copied out of them as it comes */
 
 static struct aravis_camera *own(struct lumi_camera *camera)
 {
@@ -53,8 +54,10 @@ static void on_stream(void *context, ArvStreamCallbackType type, ArvBuffer *buff
 static void on_lost(ArvDevice *device, struct aravis_camera *camera)
 {
     (void)device;
+    atomic_fetch_add(&camera->telling, 1);
     atomic_store(&camera->gone, true);
     wake(camera);
+    atomic_fetch_sub(&camera->telling, 1);
 }
 
 /* ---- arming ---- */
@@ -351,15 +354,30 @@ static int status(struct lumi_camera *base, struct lumi_camera_status *status, s
 
 /* ---- opening ---- */
 
+/* A thread of the device's own tells that the camera is lost, and holds the device meanwhile. If that were the last
+ * hold on it, the thread would end the device and wait in it for itself, for which GLib ends the program. So it is
+ * ended here, when nobody else holds it. */
+static void end_device(struct aravis_camera *camera)
+{
+    ArvDevice *device = g_object_ref(arv_camera_get_device(camera->camera));
+    int rounds = 0;
+
+    g_signal_handlers_disconnect_by_data(device, camera);
+    g_clear_object(&camera->chunks);
+    g_clear_object(&camera->camera);
+    while ((g_atomic_int_get((gint *)&G_OBJECT(device)->ref_count) > 1 || atomic_load(&camera->telling)) &&
+           rounds++ < LEAVE_ROUNDS)
+        g_usleep(1000);
+    g_object_unref(device); /* and control of it */
+}
+
 static void close_camera(struct lumi_camera *base)
 {
     struct aravis_camera *camera = own(base);
 
     disarm(base, NULL);
     if (camera->camera)
-        g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera->camera), camera);
-    g_clear_object(&camera->chunks);
-    g_clear_object(&camera->camera); /* and control of it */
+        end_device(camera);
     if (camera->event >= 0)
         close(camera->event);
     lumi_free(camera);

@@ -50,6 +50,7 @@ struct aravis_camera {
     struct camera_pool *pool;
     int event; /* eventfd: a frame has come, or the camera has gone */
     atomic_bool gone;
+    atomic_int telling; /* calls of Aravis' that have not ended */
     bool configured, gain_in_db;
     struct lumi_camera_setting setting;
     struct aravis_pixels pixels;
