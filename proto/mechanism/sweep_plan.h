@@ -100,6 +100,8 @@ double lumi_plan_span(const struct lumi_plan *plan);
  * lumi_plan_init and ends with lumi_plan_check. */
 int lumi_plan_parse(const char *text, size_t size, const char *source, const struct lumi_rig *rig,
                     struct lumi_plan *plan, struct lumi_error *error);
+/* What can be said of it without a rig: whether it is a plan at all. */
+int lumi_plan_check_text(const char *text, size_t size, const char *source, struct lumi_error *error);
 size_t lumi_plan_print(const struct lumi_plan *plan, const struct lumi_rig *rig, char *text, size_t size);
 #define LUMI_PLAN_TEXT_MAX 4096
 

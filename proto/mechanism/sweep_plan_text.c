@@ -118,7 +118,7 @@ static int set_cameras(struct parser *p, char *value)
 {
     uint32_t cameras = 0;
 
-    if (!strcmp(value, "all")) {
+    if (!strcmp(value, "all") || !p->rig) {
         p->plan->cameras = 0;
         return LUMI_OK;
     }
@@ -247,15 +247,12 @@ static int resolve_exposures(struct parser *p)
     return LUMI_OK;
 }
 
-int lumi_plan_parse(const char *text, size_t size, const char *source, const struct lumi_rig *rig,
-                    struct lumi_plan *plan, struct lumi_error *error)
+static int parse_text(struct parser *p, const char *text, size_t size)
 {
-    struct parser parser = {.rig = rig, .plan = plan, .source = source, .error = error}, *p = &parser;
     char line[TEXT_LINE];
 
-    lumi_plan_init(plan, rig);
     if (size > LUMI_PLAN_TEXT_MAX)
-        return lumi_fail(error, LUMI_ERR_LIMIT, "%s: a plan of %zu bytes, at most %d are read", source, size,
+        return lumi_fail(p->error, LUMI_ERR_LIMIT, "%s: a plan of %zu bytes, at most %d are read", p->source, size,
                          LUMI_PLAN_TEXT_MAX);
     for (size_t at = 0; at < size;) {
         p->line++;
@@ -264,8 +261,25 @@ int lumi_plan_parse(const char *text, size_t size, const char *source, const str
         LUMI_TRY(parse_line(p, line));
     }
     if (!p->section)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: section 'sweep' is missing", source);
-    LUMI_TRY(resolve_exposures(p));
+        return lumi_fail(p->error, LUMI_ERR_FORMAT, "%s: section 'sweep' is missing", p->source);
+    return resolve_exposures(p);
+}
+
+int lumi_plan_check_text(const char *text, size_t size, const char *source, struct lumi_error *error)
+{
+    struct lumi_plan plan = {0};
+    struct parser parser = {.plan = &plan, .source = source, .error = error};
+
+    return parse_text(&parser, text, size);
+}
+
+int lumi_plan_parse(const char *text, size_t size, const char *source, const struct lumi_rig *rig,
+                    struct lumi_plan *plan, struct lumi_error *error)
+{
+    struct parser parser = {.rig = rig, .plan = plan, .source = source, .error = error};
+
+    lumi_plan_init(plan, rig);
+    LUMI_TRY(parse_text(&parser, text, size));
     if (lumi_plan_check(plan, rig, error) != LUMI_OK)
         return error ? lumi_fail_prefix(error, "%s", source) : LUMI_ERR_FORMAT;
     return LUMI_OK;

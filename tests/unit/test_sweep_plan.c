@@ -455,6 +455,27 @@ static void exposures_are_listed_or_given_by_stops(void **state)
     assert_int_equal(lumi_plan_frames(&plan, &rig), 2592);
 }
 
+static void without_a_rig(const char *text, const char *reason)
+{
+    struct lumi_error error = {0};
+    int code = lumi_plan_check_text(text, strlen(text), "test.plan", &error);
+
+    assert_int_equal(code, reason ? LUMI_ERR_FORMAT : LUMI_OK);
+    if (reason)
+        assert_string_equal(error.text, reason);
+}
+
+/* What a rig can do is another question. */
+static void whether_it_is_a_plan_at_all_is_known_without_a_rig(void **state)
+{
+    (void)state;
+    without_a_rig("[sweep]\n", NULL);
+    without_a_rig("[sweep]\nmode = start-stop\ncameras = nobody, c01\nexposures_s = 1/1000, 1 / 250\n", NULL);
+    without_a_rig("[sweep]\nmode = continuous\n\nspeed = 7\n", "test.plan:4: a plan has no key 'speed'");
+    without_a_rig("", "test.plan: section 'sweep' is missing");
+    without_a_rig("[sweep]\nstops = 1\n", "test.plan: stops about what? exposure_s is missing");
+}
+
 static void refused(const char *text, const char *reason)
 {
     struct lumi_rig rig = builtin("bar2");
@@ -517,6 +538,7 @@ int main(void)
         cmocka_unit_test(a_plan_that_is_printed_parses_to_the_same_numbers),
         cmocka_unit_test(all_cameras_can_be_named_in_one_line),
         cmocka_unit_test(exposures_are_listed_or_given_by_stops),
+        cmocka_unit_test(whether_it_is_a_plan_at_all_is_known_without_a_rig),
         cmocka_unit_test(plans_that_cannot_be_read_are_refused_with_the_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
