@@ -170,9 +170,9 @@ struct lumi_engine_start {
     const char *const *override; /* checks that may be red, by name; NULL-terminated; NULL none */
     bool preflight_only;         /* ends in IDLE (or RED) with the verdict */
 };
-/* `plan_text`: docs/rig-plan.md; it is parsed against the board's profile when that is known, which is why what is
- * wrong with it may come as a red check. LUMI_ERR_BUSY: another capture is under way. LUMI_ERR_EXISTS: the name is
- * taken. */
+/* `plan_text`: docs/rig-plan.md; whether the rig can do it is known when the board's profile is, and comes as a check.
+ * LUMI_ERR_FORMAT: it is no plan at all, and in which line. LUMI_ERR_BUSY: another capture is under way.
+ * LUMI_ERR_EXISTS: the name is taken. */
 int lumi_engine_start(struct lumi_engine *engine, int64_t now_ns, const char *plan_text, size_t plan_size,
                       const struct lumi_engine_start *start, struct lumi_error *error);
 int lumi_engine_pause(struct lumi_engine *engine, int64_t now_ns, struct lumi_error *error);
@@ -181,10 +181,14 @@ int lumi_engine_resume(struct lumi_engine *engine, int64_t now_ns, struct lumi_e
 /* Ends the sweep; with what is there the capture is closed as incomplete (its missing frames named), or kept open. */
 int lumi_engine_stop(struct lumi_engine *engine, int64_t now_ns, bool at_once, bool seal, struct lumi_error *error);
 void lumi_engine_emergency_stop(struct lumi_engine *engine, int64_t now_ns);
-/* All missing and rejected frames, or those named (NULL-terminated), again; also of a capture that is sealed. */
+/* All missing and rejected frames, or those named (NULL-terminated), again; also of a capture that is sealed. `capture`
+ * NULL: the last one, or the youngest in the folder. */
 int lumi_engine_retake(struct lumi_engine *engine, int64_t now_ns, const char *capture, const char *const *frames,
                        struct lumi_error *error);
 int lumi_engine_clear(struct lumi_engine *engine, int64_t now_ns, struct lumi_error *error); /* the board's faults */
+/* Looks for the index mark, also while a capture waits because nobody knows where the rig is: `turn` is the one the
+ * operator says the arm is in, unless it winds up. What came of it is told as an incident. */
+int lumi_engine_home(struct lumi_engine *engine, int64_t now_ns, int turn, bool wind_up, struct lumi_error *error);
 /* Opens a capture that a crash left in config.folder, if there is one; *found. It goes on by itself when board and
  * cameras are there, unless it was paused. */
 int lumi_engine_recover(struct lumi_engine *engine, int64_t now_ns, bool *found, struct lumi_error *error);

@@ -64,6 +64,7 @@ int lumi_engine_start(struct lumi_engine *e, int64_t now_ns, const char *plan_te
         return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way (%s)", lumi_engine_state_name(e->state));
     if (plan_size > LUMI_PLAN_TEXT_MAX || memchr(plan_text, 0, plan_size))
         return lumi_fail(error, LUMI_ERR_FORMAT, "the plan is longer than %d bytes, or no text", LUMI_PLAN_TEXT_MAX);
+    LUMI_TRY(lumi_plan_check_text(plan_text, plan_size, "the plan", error));
     LUMI_TRY(check_name(e, start->name, error));
     LUMI_TRY(copy_overrides(e, start->override, error));
     text = lumi_calloc(plan_size + 1, 1);
@@ -205,6 +206,34 @@ int lumi_engine_clear(struct lumi_engine *e, int64_t now_ns, struct lumi_error *
     return LUMI_OK;
 }
 
+int lumi_engine_home(struct lumi_engine *e, int64_t now_ns, int turn, bool wind_up, struct lumi_error *error)
+{
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_home_tag};
+    char names[128];
+
+    e->now = now_ns > e->now ? now_ns : e->now;
+    if (!e->connected || !e->link.status_known)
+        return lumi_fail(error, LUMI_ERR_IO, "the board is away");
+    if (!resting(e) && e->stage != STAGE_PAUSED && e->stage != STAGE_INTERRUPTED)
+        return lumi_fail(error, LUMI_ERR_BUSY, "a capture is under way (%s)", lumi_engine_state_name(e->state));
+    if (e->estop)
+        return lumi_fail(error, LUMI_ERR_BUSY, "the emergency stop is pressed");
+    if (e->faults) {
+        engine_faults_text(e->faults, names, sizeof names);
+        return lumi_fail(error, LUMI_ERR_BUSY, "a fault stands: %s: look at the rig, clear, home", names);
+    }
+    if (!engine_board_rests(e))
+        return lumi_fail(error, LUMI_ERR_BUSY, "the rig moves already");
+    if (e->rig_known && e->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL)
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "the rig's drive homes by itself when a sweep begins");
+    request.command.home.wind_up = wind_up;
+    request.command.home.turn = turn;
+    e->home_wanted = true;
+    engine_send(e, &request);
+    engine_step(e);
+    return LUMI_OK;
+}
+
 /* ---- retakes that somebody asks for ---- */
 
 static int choose(struct lumi_engine *e, const char *const *frames, struct lumi_error *error)
@@ -257,12 +286,19 @@ int lumi_engine_retake(struct lumi_engine *e, int64_t now_ns, const char *captur
     e->now = now_ns > e->now ? now_ns : e->now;
     if (!resting(e))
         return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way (%s)", lumi_engine_state_name(e->state));
-    if (!capture || !capture[0] || strchr(capture, '/') == capture)
-        snprintf(path, sizeof path, "%s", capture && capture[0] ? capture : e->capture);
+    path[0] = '\0';
+    if (!capture || !capture[0]) {
+        if (e->capture[0])
+            snprintf(path, sizeof path, "%s", e->capture);
+        else
+            engine_youngest(e, path, sizeof path);
+    } else if (capture[0] == '/')
+        snprintf(path, sizeof path, "%s", capture);
     else
         snprintf(path, sizeof path, "%s/%s", e->config.folder, capture);
     if (!path[0])
-        return lumi_fail(error, LUMI_ERR_NOTFOUND, "no capture is named, and none was taken");
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: no capture is there; name one (--capture NAME)",
+                         e->config.folder);
     for (int c = 0; c < LUMI_RIG_CAMERAS; c++)
         engine_camera_reset(e, c);
     /* Nothing is unsealed for nothing. */

@@ -282,8 +282,17 @@ static bool unfinished(const char *path)
     return !strcmp(session, "taking") || !strcmp(session, "paused") || !strcmp(session, "sealed");
 }
 
+static bool is_capture(const char *path)
+{
+    char database[1500];
+    struct stat status;
+
+    snprintf(database, sizeof database, "%s/data/capture.db", path);
+    return stat(database, &status) == 0;
+}
+
 /* The youngest, by name: names begin with the date unless somebody chose another. */
-static bool find_unfinished(const struct lumi_engine *e, char *found, size_t size)
+static bool find(const struct lumi_engine *e, bool (*wanted)(const char *path), char *found, size_t size)
 {
     DIR *folder = opendir(e->config.folder);
     struct dirent *entry;
@@ -293,12 +302,17 @@ static bool find_unfinished(const struct lumi_engine *e, char *found, size_t siz
         if (entry->d_name[0] == '.' || strcmp(entry->d_name, best) <= 0)
             continue;
         snprintf(path, sizeof path, "%s/%s", e->config.folder, entry->d_name);
-        if (unfinished(path))
+        if (wanted(path))
             snprintf(best, sizeof best, "%s", entry->d_name);
     }
     if (folder)
         closedir(folder);
     return best[0] && (size_t)snprintf(found, size, "%s/%s", e->config.folder, best) < size;
+}
+
+bool engine_youngest(const struct lumi_engine *e, char *found, size_t size)
+{
+    return find(e, is_capture, found, size);
 }
 
 static bool was_paused(const char *path)
@@ -322,7 +336,7 @@ int lumi_engine_recover(struct lumi_engine *e, int64_t now_ns, bool *found, stru
     *found = false;
     if (e->store || e->stage != STAGE_REST)
         return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way");
-    if (!find_unfinished(e, path, sizeof path))
+    if (!find(e, unfinished, path, sizeof path))
         return LUMI_OK;
     const bool paused = was_paused(path);
     LUMI_TRY(engine_reopen(e, path, error));

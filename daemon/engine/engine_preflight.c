@@ -375,6 +375,20 @@ static void check_disk(struct lumi_engine *e)
                      "disk speed", "%.1f MB/s, the sweep makes %.1f MB/s", e->disk_speed * 1e-6, rate * 1e-6);
 }
 
+/* A mistyped name lets nothing pass: it is told, so that nobody believes it does. */
+static void check_overrides(struct lumi_engine *e)
+{
+    for (int i = 0; i < e->override_count; i++) {
+        int at = 0;
+        while (at < e->check_count && strcmp(e->checks[at].name, e->override[i]))
+            at++;
+        if (at == e->check_count)
+            engine_check(e, false, LUMI_YELLOW, "override", "no check is called '%.60s'", e->override[i]);
+        else if (e->check_hard[at])
+            engine_check(e, false, LUMI_YELLOW, "override", "'%.60s' cannot be overridden", e->override[i]);
+    }
+}
+
 bool engine_stage_verdict(struct lumi_engine *e)
 {
     struct lumi_error error = {0};
@@ -382,6 +396,7 @@ bool engine_stage_verdict(struct lumi_engine *e)
 
     if (e->plan_known)
         check_disk(e);
+    check_overrides(e);
     for (int i = 0; i < e->check_count; i++)
         if (e->checks[i].verdict == LUMI_RED && !e->checks[i].overridden) {
             first = red++ ? first : i;

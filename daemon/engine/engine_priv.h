@@ -206,6 +206,7 @@ struct lumi_engine {
     uint64_t event_serial;
     uint32_t faults; /* bit a fault, as events and status say */
     bool estop;
+    bool home_wanted;       /* by the operator, beside a capture */
     bool homed, home_found; /* a Homed event came since it was asked for */
     char home_text[128];
     bool ended;
@@ -272,6 +273,7 @@ struct lumi_engine {
     int test_camera;
     int64_t test_ns; /* when the test shot was fired; 0: none was */
     bool test_told;  /* the board has said so */
+    int test_again;  /* tests of this camera that nothing came of */
     int test_rounds;
     int64_t test_first_ns; /* when the camera that is tested was fired first */
     struct engine_camera cameras[LUMI_RIG_CAMERAS];
@@ -360,6 +362,7 @@ bool engine_stage_triggers(struct lumi_engine *e);
 bool engine_stage_verdict(struct lumi_engine *e);
 bool engine_stage_rows(struct lumi_engine *e);
 bool engine_stage_home(struct lumi_engine *e);
+bool engine_youngest(const struct lumi_engine *e, char *found, size_t size); /* capture in the folder, by name */
 bool engine_stage_arm(struct lumi_engine *e);
 bool engine_stage_test(struct lumi_engine *e);
 bool engine_stage_load(struct lumi_engine *e);

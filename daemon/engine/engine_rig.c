@@ -35,8 +35,10 @@ void engine_send(struct lumi_engine *e, const lumi_wire_Request *request)
 
 static void side_failed(struct lumi_engine *e, int code, const char *text)
 {
-    if (code != LUMI_OK)
-        engine_incident(e, -1, "board", "the board did not take a request: %s", text ? text : "no answer");
+    if (code == LUMI_OK)
+        return;
+    engine_incident(e, -1, "board", "the board did not take a request: %s", text ? text : "no answer");
+    e->home_wanted = false;
 }
 
 void lumi_engine_rig_reply(struct lumi_engine *e, int64_t now_ns, uint32_t number, int code, const char *text,
@@ -219,6 +221,10 @@ static void take_event(struct lumi_engine *e, struct engine_event *event)
         e->homed = true;
         e->home_found = told->kind.homed.found;
         lumi_wire_copy_text(e->home_text, sizeof e->home_text, told->kind.homed.text);
+        if (e->home_wanted)
+            engine_incident(e, -1, "homed", e->home_found ? "homed, as was asked for" : "no index mark was found: %s",
+                            e->home_text);
+        e->home_wanted = false;
         break;
     case lumi_wire_Event_sweep_ended_tag:
         engine_ended(e, told);

@@ -91,8 +91,8 @@ static bool ask_home(struct lumi_engine *e)
     if (!e->rig.string.held && e->rig.turns > 1 && !e->config.wind_up && !e->fresh) {
         engine_interrupt(
             e, false,
-            "nobody knows in which turn of its string the rig is: end lumid, home it (lumi rig home --turn N, "
-            "or --wind-up), start lumid again");
+            "nobody knows in which turn of its string the rig is: say so (lumi capture home --turn N, or --wind-up), "
+            "then resume");
         return true;
     }
     request.command.home.wind_up = e->config.wind_up && !e->rig.string.held;

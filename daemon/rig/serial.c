@@ -123,7 +123,7 @@ static int serial_open(struct lumi_rig_stream *stream, struct lumi_error *error)
     if (self->fd < 0)
         return refuse_open(self->path, error);
     if (flock(self->fd, LOCK_EX | LOCK_NB)) {
-        code = lumi_fail(error, LUMI_ERR_BUSY, "%s: another program has it locked", self->path);
+        code = lumi_fail(error, LUMI_ERR_BUSY, "%s: another program has it locked (lumid?)", self->path);
         goto fail;
     }
     LUMI_GOTO(code, fail, set_raw(self, error));

@@ -36,7 +36,7 @@ static void frame(struct bench *b, int64_t begin, int camera, int shot)
     thing.exposure_s = 1;
     if (shot >= 0)
         b->flaws[shot][camera] = 0;
-    if (flaws & BENCH_NO_FRAME)
+    if (flaws & BENCH_NO_FRAME || (shot < 0 && b->tests_lost-- > 0))
         return;
     if (flaws & BENCH_LATE)
         thing.at += 3 * BENCH_NS / 2;
@@ -97,6 +97,7 @@ static void request(void *context, uint32_t number, const lumi_wire_Request *ask
     switch (asked->which_command) {
     case lumi_wire_Request_home_tag:
         b->homes++;
+        b->home_turn = asked->command.home.turn;
         event.kind.homed.found = true;
         tell(b, b->now + 2 * BENCH_NS, event);
         break;
@@ -192,22 +193,23 @@ static void give_frame(struct bench *b, const struct bench_due *thing)
     whole->bench = b;
     b->frames_out++;
     memset(whole->bytes, thing->shot + 1, sizeof whole->bytes);
-    whole->frame = (struct lumi_camera_frame){.format = {.layout = LUMI_LAYOUT_GREY,
-                                                         .width = lens->width,
-                                                         .height = lens->height,
-                                                         .bits = 8,
-                                                         .stride = lens->width},
-                                              .data = whole->bytes,
-                                              .size = sizeof whole->bytes,
-                                              .device_ns = thing->begin + b->clock_offset[thing->camera],
-                                              .host_ns = b->now,
-                                              .sequence = ++b->sequence[thing->camera],
-                                              .damaged = thing->damaged,
-                                              .exposure_s = thing->exposure_s * b->exposure[thing->camera],
-                                              .temperature = NAN,
-                                              .file_mtime_ns = LUMI_CAMERA_NO_TIME,
-                                              .release = release,
-                                              .owner = whole};
+    whole->frame =
+        (struct lumi_camera_frame){.format = {.layout = LUMI_LAYOUT_GREY,
+                                              .width = lens->width,
+                                              .height = lens->height,
+                                              .bits = 8,
+                                              .stride = lens->width},
+                                   .data = whole->bytes,
+                                   .size = sizeof whole->bytes,
+                                   .device_ns = thing->begin + b->clock_offset[thing->camera],
+                                   .host_ns = b->now,
+                                   .sequence = ++b->sequence[thing->camera],
+                                   .damaged = thing->damaged,
+                                   .exposure_s = b->silent ? 0 : thing->exposure_s * b->exposure[thing->camera],
+                                   .temperature = NAN,
+                                   .file_mtime_ns = LUMI_CAMERA_NO_TIME,
+                                   .release = release,
+                                   .owner = whole};
     notice.frame = &whole->frame;
     lumi_engine_camera_notice(b->engine, b->now, thing->camera, &notice);
 }
@@ -430,8 +432,9 @@ void bench_engine(struct bench *b)
         notice.identity.device_clock = notice.identity.exposure_control = true;
         lumi_engine_camera_notice(b->engine, b->now, c, &notice);
         notice = (struct lumi_camera_notice){.kind = LUMI_CAMERA_STATUS};
-        notice.status.battery = notice.status.temperature = NAN;
-        notice.status.card_free_bytes = -1;
+        notice.status.battery = b->battery > 0 ? b->battery : NAN;
+        notice.status.temperature = NAN;
+        notice.status.card_free_bytes = b->card > 0 ? b->card : -1;
         lumi_engine_camera_notice(b->engine, b->now, c, &notice);
     }
     give_status(b);

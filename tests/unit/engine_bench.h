@@ -40,12 +40,17 @@ struct bench {
     bool connected, known;
     int64_t sweep_until;
     int starts, homes;
+    uint32_t home_turn; /* that the last one was told */
     /* the cameras */
     int64_t clock_offset[BENCH_CAMERAS];
     uint64_t sequence[BENCH_CAMERAS];
     double exposure[BENCH_CAMERAS];
     int told_exposures;
+    bool silent;                       /* their frames tell no exposure time */
     bool exchanged;                    /* their trigger wires */
+    int tests_lost;                    /* so many frames of test shots do not come */
+    double battery;                    /* told by the cameras if not 0 */
+    int64_t card;                      /* likewise: bytes free */
     bool tests_twice;                  /* frames of test shots come once more, 0.4 s later */
     unsigned flaws[64][BENCH_CAMERAS]; /* taken away when they have happened */
     int frames_out;

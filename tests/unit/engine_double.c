@@ -125,6 +125,15 @@ int lumi_engine_clear(struct lumi_engine *engine, int64_t now_ns, struct lumi_er
     return answer("clear", error);
 }
 
+int lumi_engine_home(struct lumi_engine *engine, int64_t now_ns, int turn, bool wind_up, struct lumi_error *error)
+{
+    (void)engine;
+    (void)now_ns;
+    engine_double.count = turn;
+    engine_double.seal = wind_up;
+    return answer("home", error);
+}
+
 const char *lumi_engine_state_name(enum lumi_engine_state state)
 {
     static const char *const names[] = {"idle",   "preflight",   "red",      "homing",  "arming", "sweeping", "pausing",

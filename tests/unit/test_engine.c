@@ -144,6 +144,181 @@ static void a_test_frame_that_comes_once_more_is_not_the_next_trigger_s(void **s
     bench_end(&b);
 }
 
+static void one_lost_test_frame_is_no_broken_trigger_two_are(void **state)
+{
+    struct bench b;
+
+    (void)state;
+    for (int lost = 1; lost <= 2; lost++) {
+        bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+        b.tests_lost = lost;
+        start(&b);
+        assert_true(bench_until(&b, lost == 1 ? LUMI_ENGINE_DONE : LUMI_ENGINE_RED, 200));
+        assert_int_equal(bench_check(&b, "trigger c00")->verdict, lost == 1 ? LUMI_YELLOW : LUMI_RED);
+        assert_int_equal(bench_check(&b, "trigger c01")->verdict, LUMI_GREEN);
+        bench_end(&b);
+    }
+}
+
+static void batteries_and_cards_are_looked_at_where_a_camera_tells(void **state)
+{
+    static const struct {
+        double battery;
+        int64_t card;
+        enum lumi_verdict battery_is, card_is;
+        const char *battery_says, *card_says;
+    } cases[] = {
+        {0.9, 64000000000, LUMI_GREEN, LUMI_GREEN, "90 %", "64.0 GB free"},
+        {0.05, 64000000000, LUMI_RED, LUMI_GREEN, "5 %", "64.0 GB free"},
+        {0.9, 1000, LUMI_GREEN, LUMI_RED, "90 %", "0.0 GB free"},
+    };
+    struct bench b;
+
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+        lumi_engine_destroy(b.engine);
+        b.battery = cases[i].battery;
+        b.card = cases[i].card;
+        bench_engine(&b);
+        start(&b);
+        bool red = cases[i].battery_is == LUMI_RED || cases[i].card_is == LUMI_RED;
+        assert_true(bench_until(&b, red ? LUMI_ENGINE_RED : LUMI_ENGINE_DONE, 200));
+        assert_int_equal(bench_check(&b, "battery c01")->verdict, cases[i].battery_is);
+        assert_string_equal(bench_check(&b, "battery c01")->reason, cases[i].battery_says);
+        assert_int_equal(bench_check(&b, "card c01")->verdict, cases[i].card_is);
+        assert_string_equal(bench_check(&b, "card c01")->reason, cases[i].card_says);
+        bench_end(&b);
+    }
+}
+
+static void what_is_no_plan_is_refused_without_a_board(void **state)
+{
+    static const char text[] = "[sweep]\nmode = continuous\nspeed = 7\n";
+    struct lumi_error error = {0};
+    struct bench b;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(lumi_engine_start(b.engine, b.now, text, strlen(text), NULL, &error), LUMI_ERR_FORMAT);
+    assert_string_equal(error.text, "the plan:3: a plan has no key 'speed'");
+    assert_int_equal(bench_status(&b)->state, LUMI_ENGINE_IDLE);
+    bench_end(&b);
+}
+
+static void a_mistyped_override_is_named(void **state)
+{
+    const char *const names[] = {"nonsense", NULL};
+    const struct lumi_engine_start wanted = {.override = names, .preflight_only = true};
+    struct lumi_error error = {0};
+    char text[LUMI_PLAN_TEXT_MAX];
+    struct bench b;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    lumi_plan_print(&b.plan, &b.rig, text, sizeof text);
+    assert_int_equal(lumi_engine_start(b.engine, b.now, text, strlen(text), &wanted, &error), LUMI_OK);
+    assert_true(bench_until(&b, LUMI_ENGINE_IDLE, 200));
+    assert_int_equal(bench_check(&b, "override")->verdict, LUMI_YELLOW);
+    assert_string_equal(bench_check(&b, "override")->reason, "no check is called 'nonsense'");
+    bench_end(&b);
+}
+
+/* The last capture, and after a restart the youngest in the folder. */
+static void a_retake_needs_no_name(void **state)
+{
+    struct lumi_error error = {0};
+    struct bench b;
+    char path[1024];
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(lumi_engine_retake(b.engine, b.now, NULL, NULL, &error), LUMI_ERR_NOTFOUND);
+    assert_non_null(strstr(error.text, "--capture NAME"));
+    start(&b);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    snprintf(path, sizeof path, "%s", bench_status(&b)->capture);
+    bench_kill(&b);
+    bench_engine(&b);
+    assert_int_equal(lumi_engine_retake(b.engine, b.now, NULL, NULL, &error), LUMI_ERR_NOTFOUND);
+    assert_non_null(strstr(error.text, "nothing is missing"));
+    assert_memory_equal(error.text, path, strlen(path));
+    bench_end(&b);
+}
+
+static void the_rig_is_homed_beside_a_capture(void **state)
+{
+    struct lumi_error error = {0};
+    struct bench b;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    bench_run(&b, 2);
+    assert_int_equal(lumi_engine_home(b.engine, b.now, 0, false, &error), LUMI_OK);
+    bench_run(&b, 20);
+    assert_int_equal(b.homes, 1);
+    start(&b);
+    assert_int_equal(lumi_engine_home(b.engine, b.now, 0, false, &error), LUMI_ERR_BUSY);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_int_equal(b.homes, 1); /* it is known where it is */
+    bench_end(&b);
+}
+
+/* An arm on a string, whose turn nobody knows after the board has started again. */
+static void an_arm_on_a_string_is_homed_by_who_knows_its_turn(void **state)
+{
+    struct lumi_error error = {0};
+    struct lumi_rig stringed;
+    struct bench b;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    assert_int_equal(lumi_rig_builtin("arc16x2", &stringed, NULL), LUMI_OK);
+    b.rig.string = stringed.string;
+    b.rig.turns = 3;
+    b.config.home_turn = 0;
+    start(&b);
+    assert_true(bench_until(&b, LUMI_ENGINE_SWEEPING, 100));
+    assert_int_equal(lumi_engine_home(b.engine, b.now, 2, false, &error), LUMI_ERR_BUSY);
+    while (bench_status(&b)->fired < 2)
+        bench_run(&b, 0.01);
+    bench_restart_board(&b);
+    bench_run(&b, 100);
+    assert_int_equal(bench_status(&b)->state, LUMI_ENGINE_INTERRUPTED);
+    assert_non_null(strstr(b.status.text, "lumi capture home --turn N"));
+    assert_int_equal(b.homes, 1);
+    assert_int_equal(lumi_engine_home(b.engine, b.now, 2, false, &error), LUMI_OK);
+    bench_run(&b, 20);
+    assert_int_equal(b.homes, 2);
+    assert_int_equal(b.home_turn, 2);
+    assert_int_equal(lumi_engine_resume(b.engine, b.now, &error), LUMI_OK);
+    assert_complete(&b, 300);
+    assert_int_equal(b.homes, 2);
+    end_whole(&b);
+}
+
+static void a_bracket_that_nobody_can_verify_is_told_before_it_is_taken(void **state)
+{
+    struct bench b;
+
+    (void)state;
+    for (int bracket = 1; bracket <= 3; bracket += 2)
+        for (int silent = 0; silent <= 1; silent++) {
+            bench_begin(&b, LUMI_PLAN_START_STOP, bracket);
+            b.silent = silent;
+            start(&b);
+            assert_true(bench_until(&b, LUMI_ENGINE_DONE, 400));
+            const struct lumi_engine_check *check = bench_check(&b, "bracket c01");
+            if (bracket > 1 && silent) {
+                assert_non_null(check);
+                assert_int_equal(check->verdict, LUMI_YELLOW);
+                assert_non_null(strstr(check->reason, "is not verified"));
+            } else
+                assert_null(check);
+            bench_end(&b);
+        }
+}
+
 static void exposures_of_a_bracket_are_told_to_the_cameras(void **state)
 {
     struct bench b;
@@ -365,6 +540,14 @@ int main(void)
         cmocka_unit_test(a_frame_that_is_judged_bad_is_taken_again),
         cmocka_unit_test(exchanged_trigger_wires_are_red_and_start_nothing),
         cmocka_unit_test(a_test_frame_that_comes_once_more_is_not_the_next_trigger_s),
+        cmocka_unit_test(one_lost_test_frame_is_no_broken_trigger_two_are),
+        cmocka_unit_test(batteries_and_cards_are_looked_at_where_a_camera_tells),
+        cmocka_unit_test(what_is_no_plan_is_refused_without_a_board),
+        cmocka_unit_test(a_mistyped_override_is_named),
+        cmocka_unit_test(a_retake_needs_no_name),
+        cmocka_unit_test(the_rig_is_homed_beside_a_capture),
+        cmocka_unit_test(an_arm_on_a_string_is_homed_by_who_knows_its_turn),
+        cmocka_unit_test(a_bracket_that_nobody_can_verify_is_told_before_it_is_taken),
         cmocka_unit_test(exposures_of_a_bracket_are_told_to_the_cameras),
         cmocka_unit_test(a_killed_program_goes_on_where_it_was),
         cmocka_unit_test(a_board_that_restarts_is_homed_and_told_what_is_done),
