@@ -142,6 +142,21 @@ static void post_clear(struct lumi_http *http, struct lumi_api_answer *answer, c
     answer_wish(http, answer, lumi_engine_clear(http->options.engine, now(http), &error), &error);
 }
 
+static const struct lumi_api_field home_fields[] = {
+    {.name = "turn", .type = LUMI_API_INT, .max = 10000},
+    {.name = "wind_up", .type = LUMI_API_BOOL},
+    {0},
+};
+
+static void post_home(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
+{
+    struct lumi_error error;
+    int code =
+        lumi_engine_home(http->options.engine, now(http), body->values[0].number, body->values[1].boolean, &error);
+
+    answer_wish(http, answer, code, &error);
+}
+
 struct stop_letter {
     struct lumi_api_letter letter;
     struct lumi_http *http;
@@ -203,7 +218,7 @@ static void get_processing(struct lumi_http *http, struct lumi_api_answer *answe
 
     (void)body;
     json_builder_begin_object(builder);
-    lumi_api_put_bool(builder, "configured", http->options.handover != NULL);
+    lumi_api_put_bool(builder, "configured", http->options.handover && http->options.processes);
     lumi_api_put_array(builder, "processing");
     for (int i = 0; i < count && i < LIST_MAX; i++) {
         json_builder_begin_object(builder);
@@ -284,6 +299,7 @@ const struct lumi_api_route lumi_api_routes[] = {
     {"/api/v1/capture/stop", "POST", stop_fields, post_stop, NULL},
     {"/api/v1/capture/retake", "POST", retake_fields, post_retake, NULL},
     {"/api/v1/capture/clear", "POST", no_fields, post_clear, NULL},
+    {"/api/v1/capture/home", "POST", home_fields, post_home, NULL},
     {"/api/v1/capture/emergency-stop", "POST", no_fields, NULL, serve_emergency_stop},
     {"/api/v1/captures", "GET", NULL, NULL, lumi_api_serve_captures},
     {"/api/v1/missing", "GET", NULL, get_missing, NULL},

@@ -61,6 +61,20 @@ void lumi_api_identity(JsonBuilder *builder, const struct lumi_camera_identity *
     lumi_api_put_bool(builder, "records_itself", identity->records_itself);
 }
 
+/* The engine's 0 is "not known". */
+static double known(double value)
+{
+    return value > 0 ? value : NAN;
+}
+
+static void put_size(JsonBuilder *builder, const char *name, int pixels)
+{
+    if (pixels > 0)
+        lumi_api_put_int(builder, name, pixels);
+    else
+        lumi_api_put_double(builder, name, NAN);
+}
+
 static void put_camera(JsonBuilder *builder, const struct lumi_engine_camera_status *camera)
 {
     lumi_api_put_text(builder, "name", camera->name);
@@ -70,10 +84,10 @@ static void put_camera(JsonBuilder *builder, const struct lumi_engine_camera_sta
     lumi_api_put_object(builder, "identity");
     lumi_api_identity(builder, &camera->identity);
     json_builder_end_object(builder);
-    lumi_api_put_int(builder, "width", camera->status.format.width);
-    lumi_api_put_int(builder, "height", camera->status.format.height);
-    lumi_api_put_double(builder, "exposure_s", camera->status.exposure_s);
-    lumi_api_put_double(builder, "gain", camera->status.gain);
+    put_size(builder, "width", camera->status.format.width);
+    put_size(builder, "height", camera->status.format.height);
+    lumi_api_put_double(builder, "exposure_s", known(camera->status.exposure_s));
+    lumi_api_put_double(builder, "gain", known(camera->status.gain));
     lumi_api_put_double(builder, "temperature", camera->status.temperature);
     lumi_api_put_double(builder, "battery", camera->status.battery);
     const int64_t card = camera->status.card_free_bytes;
@@ -90,10 +104,11 @@ static void put_camera(JsonBuilder *builder, const struct lumi_engine_camera_sta
     lumi_api_put_int(builder, "out_of_order", (int64_t)camera->out_of_order);
     lumi_api_put_int(builder, "surplus", (int64_t)camera->surplus);
     lumi_api_put_bool(builder, "clock_fitted", camera->clock_fitted);
-    lumi_api_put_double(builder, "clock_offset_s", camera->clock_offset_s);
-    lumi_api_put_double(builder, "clock_drift_ppm", camera->clock_drift_ppm);
-    lumi_api_put_double(builder, "clock_residual_s", camera->clock_residual_s);
-    lumi_api_put_double(builder, "clock_residual_worst_s", camera->clock_residual_worst_s);
+    const bool fitted = camera->clock_fitted;
+    lumi_api_put_double(builder, "clock_offset_s", fitted ? camera->clock_offset_s : NAN);
+    lumi_api_put_double(builder, "clock_drift_ppm", fitted ? camera->clock_drift_ppm : NAN);
+    lumi_api_put_double(builder, "clock_residual_s", fitted ? camera->clock_residual_s : NAN);
+    lumi_api_put_double(builder, "clock_residual_worst_s", fitted ? camera->clock_residual_worst_s : NAN);
 }
 
 static const char *link_name(enum lumi_rig_link_state state)

@@ -153,6 +153,14 @@ static int take_value(JsonNode *node, const struct lumi_api_field *field, struct
         value->boolean = json_node_get_boolean(node);
         return LUMI_OK;
     }
+    if (field->type == LUMI_API_INT) {
+        int64_t number = type == G_TYPE_INT64 ? json_node_get_int(node) : -1;
+        if (number < 0 || (uint64_t)number > field->max)
+            return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': a whole number from 0 to %zu wanted", field->name,
+                             field->max);
+        value->number = (int)number;
+        return LUMI_OK;
+    }
     if (type != G_TYPE_STRING)
         return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': a string wanted", field->name);
     if (strlen(json_node_get_string(node)) > field->max)

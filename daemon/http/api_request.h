@@ -26,18 +26,19 @@ bool lumi_api_token_matches(const char *authorization, const char *token);
 /* "EPOCH-NUMBER" of an event, as in Last-Event-ID. */
 bool lumi_api_event_id_parse(const char *text, uint32_t *epoch, uint64_t *number);
 
-enum lumi_api_type { LUMI_API_STRING = 0, LUMI_API_BOOL, LUMI_API_STRINGS };
+enum lumi_api_type { LUMI_API_STRING = 0, LUMI_API_BOOL, LUMI_API_STRINGS, LUMI_API_INT };
 struct lumi_api_field {
     const char *name; /* NULL ends a table */
     enum lumi_api_type type;
     bool required;
     bool initially; /* BOOL: where it is not given */
-    size_t max;     /* bytes of the string; number of strings, each of 255 bytes */
+    size_t max;     /* bytes of the string; number of strings, each of 255 bytes; the greatest number, from 0 on */
 };
 #define LUMI_API_FIELDS 4
 #define LUMI_API_STRING_MAX 255
 struct lumi_api_value {
     bool given, boolean;
+    int number; /* 0 where it is not given */
     char *string;
     char **strings; /* NULL-terminated */
 };

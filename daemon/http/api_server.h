@@ -21,6 +21,7 @@ struct lumi_http_options {
     int connections_peer;          /* of one address, or IPv6 network of 64 bits (64) */
     struct lumi_engine *engine;
     struct lumi_handover *handover;   /* may be NULL */
+    bool processes;                   /* the hand-over has a command to start */
     struct lumi_ingest *ingest;       /* may be NULL */
     int64_t (*now_ns)(void *context); /* in either thread */
     /* Straight to the board, in the server's thread; the engine is told later. False: the board is away, it is stopped

@@ -328,6 +328,7 @@ static int start_http(struct lumi_service *service, struct lumi_error *error)
     options.folder = config->engine.folder;
     options.engine = service->engine;
     options.handover = service->handover;
+    options.processes = config->command[0] != '\0';
     options.ingest = service->ingest;
     options.now_ns = http_now;
     options.emergency_stop = http_emergency_stop;

@@ -49,6 +49,9 @@ expect 0 "lumid goes on" "$lumi" capture resume
 expect 0 "closes the capture" "$lumi" capture stop
 expect 0 "emergency stop" "$lumi" capture stop --emergency
 expect 0 "clears" "$lumi" capture clear
+expect 0 "looks for the index mark" "$lumi" capture home --turn 3
+expect 0 "looks for the index mark" "$lumi" capture home --wind-up
+expect_line 2 "--turn: 0 or more" "$lumi" capture home --turn -1
 expect_line 2 "--emergency goes with neither" "$lumi" capture stop --emergency --now
 expect_line 3 "none: cannot open" "$lumi" capture start "$scratch/none"
 

@@ -106,6 +106,12 @@ expect 1 "camera c07     it is not there" "$lumi" capture start turn.txt
 # A plan that names cameras of another rig.
 sed 's/^cameras = .*/cameras = left/' turn.txt >other.txt
 expect 1 "plan" "$lumi" capture start other.txt
+# What is no plan is refused by its line; a mistyped override is told.
+printf '[sweep]\nmode = continuous\nspeed = 7\n' >none.txt
+expect_line 3 "the plan:3: a plan has no key 'speed'" "$lumi" capture start none.txt
+expect 1 "no check is called 'nonsense'" "$lumi" capture start turn.txt --override nonsense
+expect_line 1 "another program has it locked (lumid?)" "$lumi" rig status --link "serial:$scratch/board"
+expect 3 "no capture is there; name one (--capture NAME)" "$lumi" capture retake
 finish
 
 # ---- who may ask ----

@@ -189,7 +189,7 @@ static void every_route_is_described(void **state)
     (void)state;
 }
 
-static const char *const type_names[] = {"string", "boolean", "array"};
+static const char *const type_names[] = {"string", "boolean", "array", "integer"};
 
 static void every_field_that_is_taken_is_described(void **state)
 {
@@ -215,9 +215,10 @@ static void every_field_that_is_taken_is_described(void **state)
             if (field->type == LUMI_API_BOOL)
                 assert_int_equal(json_object_get_boolean_member(property, "default"), field->initially);
             else
-                assert_int_equal(
-                    json_object_get_int_member(property, field->type == LUMI_API_STRING ? "maxLength" : "maxItems"),
-                    field->max);
+                assert_int_equal(json_object_get_int_member(property, field->type == LUMI_API_STRING ? "maxLength"
+                                                                      : field->type == LUMI_API_INT  ? "maximum"
+                                                                                                     : "maxItems"),
+                                 field->max);
         }
         assert_int_equal(json_object_get_size(properties), count);
     }
