@@ -7,7 +7,8 @@
  * 1. What was taken is remembered by folder as long as the program runs, so that a card that was pulled out and comes
  *    back goes on where it was. A frame whose file is not there any more when it is released was probably not stored:
  *    it is taken again when it is back.
- * 2. Nothing is dropped: while as many frames are out as there are buffers, the files wait where they are. */
+ * 2. Nothing is dropped: while nobody takes the frames the host does not ask for more, and the files wait where they
+ *    are. */
 #include "daemon/camera/camera_files_priv.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
@@ -25,7 +26,7 @@
 #include <unistd.h>
 
 #define LOOK_NS 200000000 /* the folder is looked at this often */
-#define OUT_DEFAULT 4
+#define OUT_MOST 16384    /* frames out at once: only their names, all of a sweep are kept until it is over */
 
 /* Who may still hold frames when the camera is closed. */
 struct desk {
@@ -46,7 +47,7 @@ struct files_camera {
     struct lumi_camera camera; /* first */
     struct files_watch watch;
     struct desk *desk;
-    int timer, buffers;
+    int timer;
     bool armed, all;
     int64_t looked_ns;
     uint64_t frames, damaged, last_number;
@@ -121,7 +122,6 @@ static int configure(struct lumi_camera *camera, const struct lumi_camera_settin
     files->all = false;
     files->watch.settle_ns = 1000000000;
     files->watch.depth = 3;
-    files->buffers = setting->buffers > 0 ? setting->buffers : OUT_DEFAULT;
     return parse_options(files, setting->options, error);
 }
 
@@ -271,7 +271,7 @@ static int next_frame(struct lumi_camera *camera, struct lumi_camera_frame **fra
     if (!files->armed)
         return LUMI_OK;
     pthread_mutex_lock(&files->desk->lock);
-    bool full = files->desk->out >= files->buffers;
+    bool full = files->desk->out >= OUT_MOST;
     pthread_mutex_unlock(&files->desk->lock);
     if (full)
         return LUMI_OK;
@@ -337,7 +337,6 @@ int camera_files_open(const char *folder, struct lumi_camera **camera, struct lu
     }
     pthread_mutex_init(&files->desk->lock, NULL);
     files->camera.ops = &ops;
-    files->buffers = OUT_DEFAULT;
     files->timer = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK);
     if (files->timer < 0 || timerfd_settime(files->timer, 0, &often, NULL) != 0) {
         code = lumi_fail_errno(error, folder, "making a timer");

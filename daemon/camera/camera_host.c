@@ -343,9 +343,20 @@ static void keep_frame(struct lumi_camera_host *host, struct lumi_camera_frame *
     lumi_camera_frame_release(frame);
 }
 
+/* What such a camera has recorded can wait. */
+static bool can_wait(struct lumi_camera_host *host)
+{
+    bool full;
+
+    pthread_mutex_lock(&host->lock);
+    full = host->frames_waiting >= host->options.frames_max;
+    pthread_mutex_unlock(&host->lock);
+    return full && host->camera->identity.records_itself;
+}
+
 static void take_frames(struct lumi_camera_host *host)
 {
-    for (int i = 0; i < FRAMES_AT_ONCE; i++) {
+    for (int i = 0; i < FRAMES_AT_ONCE && !can_wait(host); i++) {
         struct lumi_camera_frame *frame = NULL;
         struct lumi_error error = {0};
         int code = host->camera->ops->frame(host->camera, &frame, &error);
@@ -382,7 +393,8 @@ static void wait(struct lumi_camera_host *host)
     if (!host->camera) {
         timeout = wait_ms(host->next_open_ns);
     } else {
-        count = host->armed ? host->camera->ops->poll_fds(host->camera, fds + 1, LUMI_CAMERA_POLL) : 0;
+        if (host->armed && !can_wait(host))
+            count = host->camera->ops->poll_fds(host->camera, fds + 1, LUMI_CAMERA_POLL);
         timeout = wait_ms(host->next_status_ns);
         if (host->armed && count == 0 && timeout > ASK_MS)
             timeout = ASK_MS;

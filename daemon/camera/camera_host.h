@@ -40,8 +40,9 @@ struct lumi_camera_command {
 
 struct lumi_camera_host;
 struct lumi_camera_host_options {
-    int frames_max;              /* that wait to be taken; more are dropped and counted in status.dropped (16) */
-    int retry_ms;                /* between two attempts to find a camera that is away (500) */
+    int frames_max; /* that wait to be taken; more are dropped and counted in status.dropped, or, of a camera that
+                     * records by itself, not asked for yet (16) */
+    int retry_ms;   /* between two attempts to find a camera that is away (500) */
     void (*wake)(void *context); /* in the camera's thread, when there is a notice; must not call the host */
     void *context;
 };

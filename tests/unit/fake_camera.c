@@ -11,6 +11,7 @@
 struct fake_camera {
     pthread_mutex_t lock;
     char serial[LUMI_CAMERA_TEXT], story[256];
+    bool keeps;
     bool there, armed;
     int frames, fail;
     uint64_t made;
@@ -162,10 +163,16 @@ int fake_camera_open(void *context, struct lumi_camera **camera, struct lumi_err
     opened->camera.ops = &ops;
     opened->fake = fake;
     memcpy(opened->camera.identity.serial, fake->serial, sizeof fake->serial);
+    opened->camera.identity.records_itself = fake->keeps;
     if (camera_pool_create(4, &opened->pool, error) != LUMI_OK)
         abort();
     *camera = &opened->camera;
     return end(begin(*camera, 'O'), error);
+}
+
+void fake_camera_keeps(struct fake_camera *fake)
+{
+    fake->keeps = true;
 }
 
 struct fake_camera *fake_camera_new(const char *serial)

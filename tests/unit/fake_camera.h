@@ -12,6 +12,7 @@ int fake_camera_open(void *fake, struct lumi_camera **camera, struct lumi_error 
 
 void fake_camera_plug(struct fake_camera *fake, bool there);
 void fake_camera_make_frames(struct fake_camera *fake, int count); /* come when it is armed */
+void fake_camera_keeps(struct fake_camera *fake);                  /* one that records by itself, before it is opened */
 void fake_camera_fail(struct fake_camera *fake, int code);         /* the next frame asked for fails with it, once */
 /* What was asked of it, a letter each: O open, C configure, A arm, D disarm, T trigger, E expose, X close. */
 void fake_camera_story(struct fake_camera *fake, char *story, size_t size);

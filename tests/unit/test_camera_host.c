@@ -29,7 +29,7 @@ static void on_wake(void *context)
     pthread_mutex_unlock(&world->lock);
 }
 
-static void start(struct world *world, bool there, int frames_max)
+static void start_kind(struct world *world, bool there, int frames_max, bool keeps)
 {
     struct lumi_camera_host_options options;
     struct lumi_error error;
@@ -39,6 +39,8 @@ static void start(struct world *world, bool there, int frames_max)
     pthread_cond_init(&world->woken, NULL);
     world->fake = fake_camera_new("F1");
     fake_camera_plug(world->fake, there);
+    if (keeps)
+        fake_camera_keeps(world->fake);
     lumi_camera_host_options_init(&options);
     if (frames_max)
         options.frames_max = frames_max;
@@ -46,6 +48,11 @@ static void start(struct world *world, bool there, int frames_max)
     options.wake = on_wake;
     options.context = world;
     assert_int_equal(lumi_camera_host_start_with(fake_camera_open, world->fake, &options, &world->host, &error), 0);
+}
+
+static void start(struct world *world, bool there, int frames_max)
+{
+    start_kind(world, there, frames_max, false);
 }
 
 static void stop(struct world *world)
@@ -235,6 +242,27 @@ all:
     stop(&world);
 }
 
+static void what_a_camera_keeps_waits_until_somebody_takes_it(void **state)
+{
+    struct lumi_camera_notice notice;
+    struct world world;
+
+    (void)state;
+    start_kind(&world, true, 2, true);
+    command(&world, 1, LUMI_CAMERA_CONFIGURE, 0, 0);
+    command(&world, 2, LUMI_CAMERA_ARM, 0, 0);
+    done(&world, 1, LUMI_OK);
+    done(&world, 2, LUMI_OK);
+    fake_camera_make_frames(world.fake, 10);
+    for (uint64_t i = 0; i < 10; i++) {
+        notice = next(&world, LUMI_CAMERA_FRAME);
+        assert_int_equal(notice.frame->sequence, i);
+        assert_int_equal(notice.frame->gap, 0);
+        lumi_camera_frame_release(notice.frame);
+    }
+    stop(&world);
+}
+
 static void an_error_of_a_frame_is_told_and_the_camera_goes_on(void **state)
 {
     struct world world;
@@ -295,6 +323,7 @@ int main(void)
         cmocka_unit_test(commands_to_a_camera_that_is_away_wait_or_fail),
         cmocka_unit_test(what_failed_is_not_set_up_again),
         cmocka_unit_test(frames_that_nobody_takes_are_dropped_and_counted),
+        cmocka_unit_test(what_a_camera_keeps_waits_until_somebody_takes_it),
         cmocka_unit_test(an_error_of_a_frame_is_told_and_the_camera_goes_on),
         cmocka_unit_test(frames_outlive_the_camera_and_its_thread),
         cmocka_unit_test(stopping_does_not_wait_for_a_camera_that_is_away),
