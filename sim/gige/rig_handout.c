@@ -49,7 +49,7 @@ static void describe_camera(const struct sim_rig_processes *rig, int camera, GSt
     sim_rig_processes_address(rig, camera, address);
     g_string_append_printf(text,
                            "\n[camera %s]\n# at %s\naddress = aravis:%s\ntrigger = hardware\ntrigger_input = Line1\n"
-                           "gain = 1\nlayout = %s\nchunk_data = yes\n",
+                           "gain = 1\nlayout = %s\n",
                            rig->rig.cameras[camera].name, address, serial, rig->layout);
     if (rig->bits > 0)
         g_string_append_printf(text, "bits = %d\n", rig->bits);

@@ -125,6 +125,7 @@ static void cameras_have_their_settings_and_lines(void **state)
     assert_true(cameras[0].black == 64 && cameras[0].white_red == 1.7 && cameras[0].white_blue == 1.4);
     assert_true(cameras[1].black == 0 && cameras[1].white_red == 0);
     assert_true(cameras[0].optional && !cameras[0].sync_line);
+    assert_true(cameras[0].setting.chunk_data && cameras[1].setting.chunk_data); /* as a camera without a file has it */
     assert_int_equal(cameras[1].setting.trigger, LUMI_TRIGGER_HARDWARE);
     assert_true(!cameras[1].optional && cameras[1].sync_line);
     assert_int_equal(config->gpio_count, 2);
