@@ -122,6 +122,9 @@ struct lumi_engine_ports {
     void (*drive_sweep)(void *context, uint32_t number, const struct lumi_rig *rig, const struct lumi_plan *plan,
                         uint32_t first_shot, const uint8_t *states, bool reset);
     void (*drive_cancel)(void *context); /* between two positions */
+    /* Asks it how it is, for the preflight; answered by lumi_engine_rig_reply with what it said as text. LUMI_ERR_BUSY:
+     * it has an alarm; other errors: it does not answer. */
+    void (*drive_check)(void *context, uint32_t number);
     /* Answered by a notice of LUMI_CAMERA_DONE. */
     void (*camera_command)(void *context, int camera, uint32_t number, const struct lumi_camera_command *command);
     void (*camera_power)(void *context, int camera, bool on);              /* NULL: there is no line for it */

@@ -165,19 +165,45 @@ static void check_motion(struct lumi_engine *e)
                      e->config.home_turn);
     else
         engine_check(e, false, LUMI_GREEN, "homed", "it will be homed first");
-    if (e->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL)
-        engine_check(e, true, e->ports.drive_sweep ? LUMI_GREEN : LUMI_RED, "drive", "%s",
-                     e->ports.drive_sweep ? "configured" : "the rig has an external drive, and none is configured");
     if (status->supply_mv && e->rig.control.safety.supply_minimum > 0)
         engine_check(
             e, false, status->supply_mv * 1e-3 < 1.05 * e->rig.control.safety.supply_minimum ? LUMI_YELLOW : LUMI_GREEN,
             "supply", "%.2f V, at least %.2f V", status->supply_mv * 1e-3, e->rig.control.safety.supply_minimum);
 }
 
+/* True: it is said what there is to say. */
+static bool check_drive(struct lumi_engine *e)
+{
+    if (e->stage_at == 0) {
+        if (e->rig.control.motion.drive != LUMI_RIG_DRIVE_EXTERNAL)
+            return true;
+        if (!e->ports.drive_sweep) {
+            engine_check(e, true, LUMI_RED, "drive", "the rig has an external drive, and none is configured");
+            return true;
+        }
+        e->stage_at = 1;
+        e->ask = (struct engine_ask){.number = ++e->next_number};
+        e->ports.drive_check(e->ports.context, e->ask.number);
+        return false;
+    }
+    if (!e->ask.answered)
+        return false;
+    /* An alarm is reset by who resumes what it has interrupted. */
+    engine_check(e, e->ask.code != LUMI_ERR_BUSY, e->ask.code == LUMI_OK ? LUMI_GREEN : LUMI_RED, "drive", "%s",
+                 e->ask.text);
+    return true;
+}
+
 bool engine_stage_profile(struct lumi_engine *e)
 {
     struct lumi_error error = {0};
 
+    if (e->stage_at == 1) {
+        if (!check_drive(e))
+            return false;
+        engine_go(e, STAGE_CAMERAS);
+        return true;
+    }
     if (!engine_asked(e)) {
         e->ask = (struct engine_ask){.number = ++e->next_number};
         e->ports.rig_read_profile(e->ports.context, e->ask.number);
@@ -196,6 +222,8 @@ bool engine_stage_profile(struct lumi_engine *e)
     }
     check_motion(e);
     engine_match_begin(e);
+    if (!check_drive(e))
+        return false;
     engine_go(e, STAGE_CAMERAS);
     return true;
 }

@@ -2,6 +2,8 @@
 #include "daemon/lumid/service_priv.h"
 #include "daemon/rig/bench.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -241,6 +243,64 @@ static void drive_sweep(void *context, uint32_t number, const struct lumi_rig *r
     give(service->drives, service, &asked->task, &asked->code, &asked->error);
 }
 
+struct drive_question {
+    struct lumi_task task;
+    struct lumi_service *service;
+    uint32_t number;
+    int code;
+    struct lumi_error error; /* also what it says where all is well */
+};
+
+static int ask_drive(struct lumi_rig_drive *drive, struct lumi_error *said)
+{
+    struct lumi_rig_drive_status status;
+    size_t used;
+
+    LUMI_TRY(lumi_rig_drive_status(drive, &status, said));
+    if (status.fault)
+        return lumi_fail(said, LUMI_ERR_BUSY, "%s: it has an alarm, fault %d", lumi_rig_drive_map(drive)->name,
+                         status.fault_code);
+    snprintf(said->text, sizeof said->text, "%s answers: %s, %s%s", lumi_rig_drive_map(drive)->name,
+             status.ready ? "ready" : "not ready", status.enabled ? "enabled" : "not enabled",
+             status.homed ? "" : ", not homed");
+    used = strlen(said->text);
+    if (status.position_known)
+        snprintf(said->text + used, sizeof said->text - used, ", at %.3f turns",
+                 fabs(status.turns) < 5e-4 ? 0 : status.turns); /* no "-0.000" */
+    return LUMI_OK;
+}
+
+static void question_work(struct lumi_task *task)
+{
+    struct drive_question *asked = (struct drive_question *)task;
+    struct lumi_service *service = asked->service;
+    struct lumi_rig_drive *drive = NULL;
+
+    asked->code = lumi_rig_drive_open(service->config->drive, &service->drive_map, &drive, &asked->error);
+    if (asked->code == LUMI_OK)
+        asked->code = ask_drive(drive, &asked->error);
+    lumi_rig_drive_close(drive);
+}
+
+static void question_done(struct lumi_task *task)
+{
+    struct drive_question *asked = (struct drive_question *)task;
+
+    lumi_engine_rig_reply(asked->service->engine, lumi_service_now(), asked->number, asked->code, asked->error.text,
+                          NULL);
+    lumi_inbox_wake(asked->service->inbox);
+}
+
+static void drive_check(void *context, uint32_t number)
+{
+    struct lumi_service *service = context;
+    struct drive_question *asked = lumi_service_task(sizeof *asked, question_work, question_done);
+
+    asked->service = service;
+    asked->number = number;
+    give(service->drives, service, &asked->task, &asked->code, &asked->error);
+}
+
 static void drive_cancel(void *context)
 {
     atomic_store(&((struct lumi_service *)context)->drive_cancel, true);
@@ -256,5 +316,6 @@ void lumi_service_rig_ports(struct lumi_service *service, struct lumi_engine_por
     if (service->config->drive[0]) {
         ports->drive_sweep = drive_sweep;
         ports->drive_cancel = drive_cancel;
+        ports->drive_check = drive_check;
     }
 }

@@ -11,6 +11,8 @@ here=$(cd "$(dirname "$0")" && pwd)
 if [ "${3:-}" = operate ]; then
     start_daemon 8481
     start_capture
+    "$lumi" capture status --json | grep -q 'simulated answers: [^"]*, at 0.000 turns' ||
+        fail "the drive was not asked: $("$lumi" capture status --json)"
     wait_for "interrupted: the drive: drive simulated: fault 42$" # nothing goes on by itself
     sleep 1                                                     # until the cause is gone
     "$lumi" capture resume || fail "resume"

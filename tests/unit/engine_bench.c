@@ -156,6 +156,20 @@ static int64_t to_host(void *context, uint64_t board_ns)
     return (int64_t)board_ns - BOARD_OFFSET;
 }
 
+static void drive_check(void *context, uint32_t number)
+{
+    struct bench *b = context;
+
+    due(b, &(struct bench_due){.at = b->now + BENCH_NS / 10, .kind = 6, .number = number});
+}
+
+static void drive_sweep(void *context, uint32_t number, const struct lumi_rig *rig, const struct lumi_plan *plan,
+                        uint32_t first_shot, const uint8_t *states, bool reset)
+{
+    (void)context, (void)number, (void)rig, (void)plan, (void)first_shot, (void)states, (void)reset;
+    abort(); /* nothing here goes so far */
+}
+
 /* ---- the cameras ---- */
 
 static void command(void *context, int camera, uint32_t number, const struct lumi_camera_command *asked)
@@ -291,6 +305,9 @@ static void happen(struct bench *b, const struct bench_due *thing)
                               thing->reply.result == lumi_wire_Result_DONE ? LUMI_OK : LUMI_ERR_IO,
                               thing->reply.result == lumi_wire_Result_DONE ? "" : "no answer", &thing->reply);
         break;
+    case 6:
+        lumi_engine_rig_reply(b->engine, b->now, thing->number, b->drive_code, b->drive_says, NULL);
+        break;
     case 2:
         lumi_engine_rig_profile(b->engine, b->now, thing->number, LUMI_OK, "", &b->rig);
         break;
@@ -419,6 +436,8 @@ void bench_engine(struct bench *b)
                                             .camera_command = command,
                                             .judge = judge,
                                             .hand_over = hand_over,
+                                            .drive_check = b->drive_says ? drive_check : NULL,
+                                            .drive_sweep = b->drive_says ? drive_sweep : NULL,
                                             .told = told};
     struct lumi_error error = {0};
 

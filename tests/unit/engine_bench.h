@@ -54,6 +54,9 @@ struct bench {
     bool tests_twice;                  /* frames of test shots come once more, 0.4 s later */
     unsigned flaws[64][BENCH_CAMERAS]; /* taken away when they have happened */
     int frames_out;
+    /* the drive, if drive_says: how it answers */
+    const char *drive_says;
+    int drive_code;
     /* the disk */
     bool disk_full;
     /* what was told */

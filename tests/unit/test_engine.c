@@ -297,6 +297,42 @@ static void an_arm_on_a_string_is_homed_by_who_knows_its_turn(void **state)
     end_whole(&b);
 }
 
+static void a_drive_is_asked_before_it_is_believed_in(void **state)
+{
+    static const struct {
+        const char *says;
+        int code;
+        bool can_override;
+    } cases[] = {{NULL, 0, false},
+                 {"D1 answers: ready", LUMI_OK, false},
+                 {"no answer", LUMI_ERR_IO, false},
+                 {"an alarm, fault 42", LUMI_ERR_BUSY, true}};
+    const char *const names[] = {"drive", NULL};
+    const struct lumi_engine_start wanted = {.override = names, .preflight_only = true};
+    char text[LUMI_PLAN_TEXT_MAX];
+    struct lumi_error error;
+    struct bench b;
+
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        bench_begin(&b, LUMI_PLAN_START_STOP, 1);
+        lumi_engine_destroy(b.engine);
+        b.rig.control.motion.drive = LUMI_RIG_DRIVE_EXTERNAL;
+        b.drive_says = cases[i].says;
+        b.drive_code = cases[i].code;
+        bench_engine(&b);
+        lumi_plan_print(&b.plan, &b.rig, text, sizeof text);
+        assert_int_equal(lumi_engine_start(b.engine, b.now, text, strlen(text), &wanted, &error), LUMI_OK);
+        const bool good = cases[i].says && cases[i].code == LUMI_OK;
+        assert_true(bench_until(&b, good || cases[i].can_override ? LUMI_ENGINE_IDLE : LUMI_ENGINE_RED, 200));
+        assert_int_equal(bench_check(&b, "drive")->verdict, good ? LUMI_GREEN : LUMI_RED);
+        assert_int_equal(bench_check(&b, "drive")->overridden, cases[i].can_override);
+        assert_string_equal(bench_check(&b, "drive")->reason,
+                            cases[i].says ? cases[i].says : "the rig has an external drive, and none is configured");
+        bench_end(&b);
+    }
+}
+
 static void a_bracket_that_nobody_can_verify_is_told_before_it_is_taken(void **state)
 {
     struct bench b;
@@ -547,6 +583,7 @@ int main(void)
         cmocka_unit_test(a_retake_needs_no_name),
         cmocka_unit_test(the_rig_is_homed_beside_a_capture),
         cmocka_unit_test(an_arm_on_a_string_is_homed_by_who_knows_its_turn),
+        cmocka_unit_test(a_drive_is_asked_before_it_is_believed_in),
         cmocka_unit_test(a_bracket_that_nobody_can_verify_is_told_before_it_is_taken),
         cmocka_unit_test(exposures_of_a_bracket_are_told_to_the_cameras),
         cmocka_unit_test(a_killed_program_goes_on_where_it_was),
