@@ -15,6 +15,23 @@ static const struct lumi_api_field fields[] = {
     {0},
 };
 
+static const struct lumi_api_field numbers[] = {
+    {.name = "turn", .type = LUMI_API_INT, .max = 9},
+    {.name = "wind_up", .type = LUMI_API_BOOL},
+    {0},
+};
+
+static void read_numbers(const char *text, size_t size)
+{
+    struct lumi_error error = {0};
+    struct lumi_api_body body;
+    int code = checked(lumi_api_body_parse(text, size, numbers, &body, &error), &error);
+
+    if (code == LUMI_OK && (body.values[0].number < 0 || body.values[0].number > 9))
+        abort();
+    lumi_api_body_clear(&body);
+}
+
 static void read_body(const char *text, size_t size)
 {
     struct lumi_error error = {0};
@@ -65,6 +82,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     if (data[0] % 6 == 0) {
         read_body((const char *)data + 1, size - 1);
+        read_numbers((const char *)data + 1, size - 1);
         return 0;
     }
     if (size > sizeof text) /* a header is at most that long here */
