@@ -14,9 +14,10 @@
 #include <string.h>
 
 static char *profile, *rig_text = "arc16", *size_text, *faults_path, *folder, *layout = "raw", *process;
-static double scale = 1, speed = 1, full_well, read_noise, exposure = 0.004, position_time = 2, patience = 120;
+static double scale = 1, speed = 1, full_well, read_noise, exposure = 0.004, white = 0.004, position_time,
+              patience = 120;
 static int seed = 1, processes, first_host = 2, bits, port = 8470;
-static gboolean own_network, drive;
+static gboolean own_network, drive, continuous;
 static volatile sig_atomic_t stop;
 
 static const GOptionEntry options[] = {
@@ -39,10 +40,13 @@ static const GOptionEntry options[] = {
      "in a network namespace, with COMMAND: other programs' cameras are not met", NULL},
     {"full-well", 0, 0, G_OPTION_ARG_DOUBLE, &full_well, "electrons at white: turns shot noise on", "ELECTRONS"},
     {"read-noise", 0, 0, G_OPTION_ARG_DOUBLE, &read_noise, "electrons, one standard deviation (0)", "ELECTRONS"},
-    {"exposure", 0, 0, G_OPTION_ARG_DOUBLE, &exposure, "of the plan, seconds; as bright as the place at 0.004 (0.004)",
-     "S"},
-    {"position-time", 0, 0, G_OPTION_ARG_DOUBLE, &position_time, "of the plan, seconds from position to position (2)",
-     "S"},
+    {"exposure", 0, 0, G_OPTION_ARG_DOUBLE, &exposure, "of the plan, seconds (0.004)", "S"},
+    {"white", 0, 0, G_OPTION_ARG_DOUBLE, &white,
+     "seconds of exposure that make a picture as bright as the place (0.004)", "S"},
+    {"continuous", 0, 0, G_OPTION_ARG_NONE, &continuous, "the plan turns evenly instead of stopping at every position",
+     NULL},
+    {"position-time", 0, 0, G_OPTION_ARG_DOUBLE, &position_time,
+     "of the plan, seconds from position to position (as drawing needs, 2 at least)", "S"},
     {"patience", 0, 0, G_OPTION_ARG_DOUBLE, &patience,
      "in lumid.conf: seconds a frame may take, which is as long as the drawing takes here (120)", "S"},
     {"layout", 0, 0, G_OPTION_ARG_STRING, &layout, "of the frames in lumid.conf: raw (default), rgb or jpeg", "LAYOUT"},
@@ -66,6 +70,7 @@ static void ready(const struct sim_rig_processes *rig)
     sim_rig_processes_address(rig, rig->rig.camera_count - 1, last);
     printf("ready: board serial:%s/board, %d cameras at %s to %s, lumid --config %s/lumid.conf\n", rig->folder,
            rig->rig.camera_count, first, last, rig->folder);
+    printf("plan: %d positions a turn, one every %.1f s\n", rig->rig.positions, rig->position_time);
     fflush(stdout);
 }
 
@@ -126,8 +131,10 @@ static int check(struct lumi_error *error)
         return lumi_fail(error, LUMI_ERR_ARG, "--speed: more than 0, at most 100");
     if (!(exposure >= 1e-5 && exposure <= 10))
         return lumi_fail(error, LUMI_ERR_ARG, "--exposure: 0.00001 to 10");
-    if (!(position_time > 0 && position_time <= 3600))
-        return lumi_fail(error, LUMI_ERR_ARG, "--position-time: more than 0, at most 3600");
+    if (!(white >= 1e-5 && white <= 10))
+        return lumi_fail(error, LUMI_ERR_ARG, "--white: 0.00001 to 10");
+    if (!(position_time >= 0 && position_time <= 3600))
+        return lumi_fail(error, LUMI_ERR_ARG, "--position-time: 0 to 3600");
     if (!(patience >= 0.1 && patience <= 3600))
         return lumi_fail(error, LUMI_ERR_ARG, "--patience: 0.1 to 3600");
     if (port < 0 || port > 65535)
@@ -163,6 +170,8 @@ static int run(int argc, char **argv, struct lumi_error *error)
     LUMI_TRY(sim_sensor_check(&rig.sensor, error));
     rig.faults = faults_path ? &script : NULL;
     rig.exposure = exposure;
+    rig.reference = white;
+    rig.continuous = continuous;
     rig.position_time = position_time;
     g_strlcpy(rig.layout, layout, sizeof rig.layout);
     rig.bits = bits;

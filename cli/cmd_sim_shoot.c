@@ -3,9 +3,11 @@
 #include "sim/place.h"
 #include "sim/shoot.h"
 
+#include <math.h>
+
 static char *out, *rig_text, *size_text, *format_text, *lens_text, *depth_dir;
 static int threads, bits, seed = 1;
-static double fov, scale = 1, exposure, vignetting, full_well, read_noise;
+static double fov, scale = 1, turned, exposure, vignetting, full_well, read_noise;
 static gboolean inward;
 
 static const GOptionEntry options[] = {
@@ -20,9 +22,12 @@ static const GOptionEntry options[] = {
     {"fov", 0, 0, G_OPTION_ARG_DOUBLE, &fov, "horizontal field of view in degrees, for planar and sphere", "DEGREES"},
     {"lens", 0, 0, G_OPTION_ARG_STRING, &lens_text, "pinhole, brown or fisheye, for planar and sphere", "LENS"},
     {"inward", 0, 0, G_OPTION_ARG_NONE, &inward, "a sphere's cameras look at its centre", NULL},
-    {"format", 0, 0, G_OPTION_ARG_STRING, &format_text, "png (default), jpeg or exr (linear light)", "FORMAT"},
+    {"format", 0, 0, G_OPTION_ARG_STRING, &format_text,
+     "png (default), jpeg, exr (linear light) or dng (what a sensor says behind its colour filter)", "FORMAT"},
     {"truth-depth", 0, 0, G_OPTION_ARG_FILENAME, &depth_dir, "also writes every frame's true depth there, NAME.exr",
      "DIR"},
+    {"turned", 0, 0, G_OPTION_ARG_DOUBLE, &turned,
+     "degrees that the rig turns during every exposure: motion blur about the true pose (0)", "DEGREES"},
     {"exposure", 0, 0, G_OPTION_ARG_DOUBLE, &exposure, "stops (0)", "STOPS"},
     {"vignetting", 0, 0, G_OPTION_ARG_DOUBLE, &vignetting, "share of the light lost in the corners (0)", "SHARE"},
     {"full-well", 0, 0, G_OPTION_ARG_DOUBLE, &full_well, "electrons at white: turns shot noise on", "ELECTRONS"},
@@ -42,7 +47,7 @@ static void progress(void *context, int done, int total)
 static int parse(struct sim_rig_options *rig, struct sim_output *output, struct lumi_error *error)
 {
     static const char *const lenses[] = {"default", "pinhole", "brown", "fisheye", NULL};
-    static const char *const formats[] = {"png", "jpeg", "exr", NULL};
+    static const char *const formats[] = {"png", "jpeg", "exr", "dng", NULL};
     int size[2] = {0, 0}, lens = 0, format = 0;
 
     if (!out)
@@ -65,6 +70,7 @@ static int parse(struct sim_rig_options *rig, struct sim_output *output, struct 
     output->format = (enum sim_format)format;
     output->threads = threads;
     output->depth_dir = depth_dir;
+    output->turned = turned * LUMI_PI / 180;
     output->sensor.exposure = exposure;
     output->sensor.vignetting = vignetting;
     output->sensor.full_well = full_well;
@@ -86,7 +92,14 @@ static int run(int argc, char **argv, struct lumi_error *error)
     (void)argc;
     LUMI_TRY(parse(&rig_options, &output, error));
     output.context = argv[0];
+    if (!(fabs(turned) <= 90))
+        return lumi_fail(error, LUMI_ERR_ARG, "--turned %g: -90 to 90 degrees wanted", turned);
     LUMI_GOTO(code, done, sim_rig_init(&rig, rig_text ? rig_text : "arc16", &rig_options, error));
+    if (turned != 0 && !rig.mechanism) {
+        code = lumi_fail(error, LUMI_ERR_ARG, "--turned: a rig that turns is wanted: arc16, arc16x2, bar2, arc:…");
+        goto done;
+    }
+    output.profile = &rig.profile;
     LUMI_GOTO(code, done, sim_place_open(argv[0], &scene, error));
     LUMI_GOTO(code, done, sim_shoot(scene, argv[0], &rig, &output, out, error));
 done:

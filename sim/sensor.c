@@ -78,3 +78,16 @@ void sim_sensor_apply(const struct sim_sensor *s, uint64_t frame, struct lumi_ra
         }
     }
 }
+
+int sim_sensor_filter(const struct lumi_raster *picture, int width, int height, struct lumi_raster *raw)
+{
+    LUMI_TRY(lumi_raster_create(raw, width, height, 1, LUMI_F32));
+    for (int y = 0; y < height; y++) {
+        const float *from = lumi_row_f32(picture, y);
+        float *to = lumi_row_f32(raw, y);
+
+        for (int x = 0; x < width; x++, from += 3)
+            to[x] = from[(x & 1) + (y & 1)];
+    }
+    return LUMI_OK;
+}

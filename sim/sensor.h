@@ -21,4 +21,8 @@ int sim_sensor_check(const struct sim_sensor *sensor, struct lumi_error *error);
 /* Changes linear light (F32, 1 is white) in place. */
 void sim_sensor_apply(const struct sim_sensor *sensor, uint64_t frame, struct lumi_raster *picture);
 
+/* One number a pixel: what a colour filter R G / G B lets through. `raw` is created, of the picture's upper left part.
+ */
+int sim_sensor_filter(const struct lumi_raster *picture, int width, int height, struct lumi_raster *raw);
+
 #endif

@@ -4,11 +4,15 @@
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
+#include "proto/image/image_head.h"
 #include "sim/camera.h"
+#include "sim/exposure.h"
 
 #include <errno.h>
 #include <glib.h>
 #include <glib/gstdio.h>
+#include <math.h>
+#include <string.h>
 #include <unistd.h>
 
 void sim_output_init(struct sim_output *output)
@@ -19,7 +23,9 @@ void sim_output_init(struct sim_output *output)
 
 const char *sim_format_extension(enum sim_format format)
 {
-    return format == SIM_FORMAT_JPEG ? ".jpg" : format == SIM_FORMAT_EXR ? ".exr" : ".png";
+    static const char *const extensions[] = {".png", ".jpg", ".exr", ".dng"};
+
+    return extensions[format];
 }
 
 static void image_options(const struct sim_output *output, struct lumi_image_options *options)
@@ -44,6 +50,67 @@ static int write_depth(const char *path, const struct lumi_raster *depth, struct
     return lumi_image_write(path, depth, &options, error);
 }
 
+/* Sensor values as the simulated cameras of a rig send them and lumid stores them. */
+static int encode_raw(const struct sim_output *output, int index, const struct lumi_raster *color, uint8_t **data,
+                      size_t *size, struct lumi_error *error)
+{
+    const int bits = output->sensor.bits ? output->sensor.bits : 12, bytes = bits > 8 ? 2 : 1;
+    struct lumi_raster raw = {0};
+    struct lumi_head head;
+    uint8_t *top = NULL;
+    size_t top_size;
+    int code;
+
+    LUMI_GOTO(code, done, sim_sensor_filter(color, color->width, color->height, &raw));
+    sim_sensor_apply(&output->sensor, (uint64_t)index, &raw);
+    lumi_head_init(&head);
+    head.kind = LUMI_HEAD_BAYER;
+    head.width = raw.width;
+    head.height = raw.height;
+    head.bits = bits;
+    memcpy(head.filter, (uint8_t[]){0, 1, 1, 2}, 4);
+    head.software = "Lumisphere";
+    LUMI_GOTO(code, done, lumi_head_make(&head, &top, &top_size, error));
+    *size = top_size + (size_t)raw.width * (size_t)raw.height * (size_t)bytes;
+    *data = lumi_alloc(*size, 1);
+    code = *data ? LUMI_OK : LUMI_ERR_NOMEM;
+    if (*data)
+        memcpy(*data, top, top_size);
+    for (int y = 0; *data && y < raw.height; y++) {
+        uint8_t *to = *data + top_size + (size_t)y * (size_t)raw.width * (size_t)bytes;
+        for (int x = 0; x < raw.width; x++) {
+            const unsigned value =
+                (unsigned)(fminf(fmaxf(lumi_row_f32(&raw, y)[x], 0), 1) * (float)((1 << bits) - 1) + 0.5f);
+            *to++ = (uint8_t)value;
+            if (bytes == 2)
+                *to++ = (uint8_t)(value >> 8);
+        }
+    }
+done:
+    if (code == LUMI_ERR_NOMEM)
+        lumi_fail(error, code, "no memory for a picture");
+    lumi_free(top);
+    lumi_raster_finish(&raw);
+    return code;
+}
+
+static int render(const struct sim_scene *scene, const struct sim_view *view, const struct sim_output *output,
+                  struct lumi_raster *color, struct lumi_raster *depth, struct lumi_error *error)
+{
+    const struct sim_moment moment = {view->turn_angle, view->drop, output->turned, 0};
+
+    if (output->turned == 0)
+        return sim_camera_render(scene, &view->lens, &view->pose, output->threads, color, depth, error);
+    LUMI_TRY(sim_exposure_render(scene, output->profile, view->camera, &moment, output->threads, color, error));
+    if (depth) { /* of the middle */
+        struct lumi_raster sharp = {0};
+        int code = sim_camera_render(scene, &view->lens, &view->pose, output->threads, &sharp, depth, error);
+        lumi_raster_finish(&sharp);
+        return code;
+    }
+    return LUMI_OK;
+}
+
 int sim_view_encode(const struct sim_scene *scene, const struct sim_view *view, int index,
                     const struct sim_output *output, const char *depth_path, uint8_t **data, size_t *size,
                     struct lumi_error *error)
@@ -53,12 +120,14 @@ int sim_view_encode(const struct sim_scene *scene, const struct sim_view *view, 
     int code;
 
     image_options(output, &options);
-    LUMI_GOTO(
-        code, done,
-        sim_camera_render(scene, &view->lens, &view->pose, output->threads, &color, depth_path ? &depth : NULL, error));
-    sim_sensor_apply(&output->sensor, (uint64_t)index, &color);
+    LUMI_GOTO(code, done, render(scene, view, output, &color, depth_path ? &depth : NULL, error));
     if (depth_path)
         LUMI_GOTO(code, done, write_depth(depth_path, &depth, error));
+    if (output->format == SIM_FORMAT_DNG) {
+        code = encode_raw(output, index, &color, data, size, error);
+        goto done;
+    }
+    sim_sensor_apply(&output->sensor, (uint64_t)index, &color);
     if (output->format == SIM_FORMAT_EXR) {
         LUMI_GOTO(code, done, lumi_image_encode(&color, &options, data, size, error));
     } else {

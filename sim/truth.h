@@ -11,15 +11,17 @@
 
 #include <stdbool.h>
 
-enum sim_format { SIM_FORMAT_PNG, SIM_FORMAT_JPEG, SIM_FORMAT_EXR };
+enum sim_format { SIM_FORMAT_PNG, SIM_FORMAT_JPEG, SIM_FORMAT_EXR, SIM_FORMAT_DNG /* sensor values */ };
 
 typedef void (*sim_progress_fn)(void *context, int done, int total);
 
 struct sim_output {
     enum sim_format format;
     struct sim_sensor sensor;
-    int threads;           /* 0: as many as there are */
-    const char *depth_dir; /* where depth maps go; NULL: none (truth: its own folder when `depth` is set) */
+    const struct lumi_rig *profile; /* of the views, where `turned` is set */
+    double turned;                  /* radians that the platform turns during an exposure */
+    int threads;                    /* 0: as many as there are */
+    const char *depth_dir;          /* where depth maps go; NULL: none (truth: its own folder when `depth` is set) */
     bool depth;
     bool overwrite; /* truth: into a folder that exists */
     sim_progress_fn progress;

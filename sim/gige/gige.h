@@ -27,6 +27,7 @@ struct sim_gige_exposure {
     bool line;                 /* by the hardware line; otherwise as `fire` asked */
     uint64_t begin_ns, end_ns; /* by the clock that all share */
     double angle, drop, moved; /* the rig at the middle, and how far it turned; the source's to read */
+    double askew;              /* radians, how far somebody has turned the camera aside; the source's as well */
     struct sim_gige_fault fault;
 };
 

@@ -8,8 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-/* One number a pixel behind a filter R G / G B, or all three of them as grey. */
-static int filter(const struct gige_shot *shot, const struct lumi_raster *picture, struct lumi_raster *raw)
+static int make_grey(const struct gige_shot *shot, const struct lumi_raster *picture, struct lumi_raster *raw)
 {
     LUMI_TRY(lumi_raster_create(raw, shot->width, shot->height, 1, LUMI_F32));
     for (int y = 0; y < shot->height; y++) {
@@ -17,8 +16,7 @@ static int filter(const struct gige_shot *shot, const struct lumi_raster *pictur
         float *to = lumi_row_f32(raw, y);
 
         for (int x = 0; x < shot->width; x++, from += 3)
-            to[x] = shot->format == GIGE_MONO8 ? 0.2126f * from[0] + 0.7152f * from[1] + 0.0722f * from[2]
-                                               : from[(x & 1) + (y & 1)];
+            to[x] = 0.2126f * from[0] + 0.7152f * from[1] + 0.0722f * from[2];
     }
     return LUMI_OK;
 }
@@ -92,7 +90,10 @@ static int encode_raw(const struct gige_shot *shot, const struct lumi_raster *pi
     struct lumi_raster raw = {0};
     int code;
 
-    LUMI_GOTO(code, done, filter(shot, picture, &raw));
+    if (shot->format == GIGE_MONO8)
+        LUMI_GOTO(code, done, make_grey(shot, picture, &raw));
+    else
+        LUMI_GOTO(code, done, sim_sensor_filter(picture, shot->width, shot->height, &raw));
     expose(shot, &raw);
     *size = gige_format_bytes(shot->format, shot->width, shot->height);
     *data = lumi_calloc(*size + 1, 1);

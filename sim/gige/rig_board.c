@@ -50,6 +50,7 @@ static void tell_exposed(struct board_process *b, struct sim_machine *machine, i
                                               .doubled = fault->frames_doubled,
                                               .late = fault->frames_late,
                                               .loss = fault->packets_lost};
+    exposure->askew = fault->askew * LUMI_PI / 180;
     message.exposure = *exposure;
     message.now_ns = to_ns(sim_machine_now(machine));
     tell(b, b->setup->owner[camera], &message);

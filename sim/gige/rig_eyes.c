@@ -4,6 +4,7 @@
 #include "proto/base/memory.h"
 #include "proto/mechanism/kinematics.h"
 #include "sim/camera.h"
+#include "sim/exposure.h"
 #include "sim/place.h"
 
 #include <errno.h>
@@ -15,9 +16,9 @@
 #include <time.h>
 #include <unistd.h>
 
-#define LOOKS 12     /* small pictures of each camera before it begins */
-#define BLUR_STEPS 9 /* poses that an exposure is made of, at most: one a pixel of smear */
-#define THREADS 1    /* a picture: there is a process for every processor */
+#define LOOKS 12   /* small pictures of each camera before it begins */
+#define MEASURED 4 /* pictures that are drawn to see how long it takes */
+#define THREADS 1  /* a picture: there is a process for every processor */
 
 struct eyes {
     const struct rig_eyes *setup;
@@ -55,45 +56,13 @@ static void set_clock(struct eyes *e, uint64_t board_ns)
     pthread_mutex_unlock(&e->lock);
 }
 
-static void add(struct lumi_raster *sum, const struct lumi_raster *picture, float share)
-{
-    for (int y = 0; y < sum->height; y++) {
-        const float *from = lumi_row_f32(picture, y);
-        float *to = lumi_row_f32(sum, y);
-
-        for (int i = 0; i < sum->width * sum->channels; i++)
-            to[i] += share * from[i];
-    }
-}
-
 static int picture(void *context, int index, const struct sim_gige_exposure *exposure, struct lumi_raster *raster,
                    struct lumi_error *error)
 {
     const struct eyes *e = context;
-    const struct lumi_rig *rig = &e->setup->rig->rig;
-    const int camera = e->setup->first + index;
-    const struct lumi_lens *lens = &rig->lenses[rig->cameras[camera].lens].lens;
-    const int steps = (int)fmin(fmax(ceil(fabs(exposure->moved) * lens->fx * 2), 1), BLUR_STEPS);
-    int code = LUMI_OK;
+    const struct sim_moment moment = {exposure->angle, exposure->drop, exposure->moved, exposure->askew};
 
-    for (int i = 0; i < steps && code == LUMI_OK; i++) {
-        const double angle = exposure->angle + exposure->moved * ((i + 0.5) / steps - 0.5);
-        struct lumi_raster one = {0};
-        struct lumi_pose pose;
-
-        lumi_rig_camera_pose_at(rig, camera, angle, exposure->drop, &pose);
-        code = sim_camera_render(e->scene, lens, &pose, THREADS, &one, NULL, error);
-        if (code == LUMI_OK && steps > 1) {
-            if (i == 0)
-                code = lumi_raster_create(raster, one.width, one.height, one.channels, LUMI_F32);
-            if (code == LUMI_OK)
-                add(raster, &one, 1.0f / (float)steps);
-            lumi_raster_finish(&one);
-        } else if (code == LUMI_OK) {
-            *raster = one;
-        }
-    }
-    return code;
+    return sim_exposure_render(e->scene, &e->setup->rig->rig, e->setup->first + index, &moment, THREADS, raster, error);
 }
 
 /* The place's indirect light is computed where somebody first looks: small pictures all around, before anybody waits
@@ -119,6 +88,22 @@ static int look_around(const struct eyes *e, struct lumi_error *error)
         lumi_raster_finish(&small);
     }
     return LUMI_OK;
+}
+
+/* How long the frames of a position take to be drawn, as busy as the computer is now; −1: not at all. */
+static double measure(struct eyes *e, struct lumi_error *error)
+{
+    const uint64_t begin = host_ns();
+
+    for (int i = 0; i < MEASURED; i++) {
+        const struct sim_gige_exposure exposure = {.angle = 2 * LUMI_PI * (i + 0.5) / MEASURED};
+        struct lumi_raster raster = {0};
+
+        if (picture(e, i * e->setup->count / MEASURED, &exposure, &raster, error) != LUMI_OK)
+            return -1;
+        lumi_raster_finish(&raster);
+    }
+    return (double)(host_ns() - begin) * 1e-9 / MEASURED * e->setup->count;
 }
 
 static void tell(struct eyes *e, const struct rig_message *message)
@@ -207,7 +192,12 @@ int rig_eyes_run(const struct rig_eyes *setup, struct lumi_error *error)
     LUMI_GOTO(code, done, add_cameras(&eyes, error));
     LUMI_GOTO(code, done, look_around(&eyes, error));
     LUMI_GOTO(code, done, sim_gige_start(eyes.gige, 1, error));
-    rig_report(setup->report, LUMI_OK, NULL);
+    const double drawing = measure(&eyes, error);
+    if (drawing < 0) {
+        code = LUMI_ERR_NOMEM;
+        goto done;
+    }
+    rig_report_drawing(setup->report, drawing);
     listen_to_board(&eyes);
 done:
     sim_gige_destroy(eyes.gige);

@@ -26,13 +26,13 @@ static int write_text(const struct sim_rig_processes *rig, const char *name, con
     return code == 0 ? LUMI_OK : LUMI_ERR_IO;
 }
 
-static int write_plan(const struct sim_rig_processes *rig, struct lumi_error *error)
+int rig_plan_write(const struct sim_rig_processes *rig, struct lumi_error *error)
 {
     char text[LUMI_PLAN_TEXT_MAX];
     struct lumi_plan plan;
 
     lumi_plan_init(&plan, &rig->rig);
-    plan.mode = LUMI_PLAN_START_STOP;
+    plan.mode = rig->continuous ? LUMI_PLAN_CONTINUOUS : LUMI_PLAN_START_STOP;
     plan.position_time = rig->position_time;
     plan.turn_time = rig->position_time * plan.positions;
     plan.exposures[0] = rig->exposure;
@@ -94,7 +94,6 @@ int rig_files_write(const struct sim_rig_processes *rig, struct lumi_error *erro
 
     lumi_rig_print(&rig->rig, text, LUMI_RIG_TEXT_MAX);
     LUMI_TRY(write_text(rig, "rig.txt", text, error));
-    LUMI_TRY(write_plan(rig, error));
     if (rig->drive)
         LUMI_TRY(write_text(rig, "drive.map", rig_drive_map, error));
     return write_configuration(rig, error);

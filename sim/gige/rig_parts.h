@@ -10,9 +10,11 @@
 /* What a process tells its parent: that it is ready, or why not. */
 struct rig_report {
     int code;
+    double drawing; /* s, that the frames of a position take; of cameras */
     char text[1024];
 };
 void rig_report(int fd, int code, const struct lumi_error *error);
+void rig_report_drawing(int fd, double seconds); /* ready */
 
 /* `eyes`: a socket to each process of cameras; camera c belongs to number owner[c]. */
 struct rig_board {
@@ -43,6 +45,8 @@ int rig_drive_run(const struct rig_drive *drive, struct lumi_error *error);
 #define RIG_DRIVE_SPEED 9000.0      /* a second, while nobody has said another */
 extern const char rig_drive_map[];
 
+/* All but the plan, which waits for what drawing turns out to take. */
+int rig_plan_write(const struct sim_rig_processes *rig, struct lumi_error *error);
 int rig_files_write(const struct sim_rig_processes *rig, struct lumi_error *error);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,8 +19,10 @@
 #define CHILDREN (3 + RIG_EYES_MAX) /* the board, a drive, cameras, the caller's command */
 #define BOARD (-1)                  /* in place of a number of cameras */
 #define DRIVE (-2)
-#define PATIENCE_S 10     /* until those that were asked to end are killed */
-#define FIRST_LINES_S 120 /* until all are ready: places take their time to be built */
+#define PATIENCE_S 10      /* until those that were asked to end are killed */
+#define POSITION_LEAST 2.0 /* s */
+#define POSITION_SHARE 0.6 /* of a position's time that drawing may take: others want the processors as well */
+#define FIRST_LINES_S 600  /* until all are ready: places take their time to be built */
 
 struct child {
     pid_t pid; /* 0: none, or it has ended */
@@ -35,6 +38,7 @@ struct processes {
     int eyes[RIG_EYES_MAX][2]; /* [0] the board's, [1] the cameras' */
     int eye_count;
     int drive[2];                /* [0] the board's, [1] the drive's; −1 where there is none */
+    double drawing;              /* s, that a position takes the slowest of the cameras */
     int first[RIG_EYES_MAX + 1]; /* cameras of process i: first[i] .. first[i + 1] − 1 */
 };
 
@@ -47,7 +51,6 @@ void sim_rig_processes_init(struct sim_rig_processes *rig)
     rig->first_host = 2;
     sim_sensor_init(&rig->sensor);
     rig->reference = rig->exposure = 0.004;
-    rig->position_time = 2;
     snprintf(rig->layout, sizeof rig->layout, "raw");
     rig->patience = 120;
     rig->port = 8470;
@@ -69,6 +72,14 @@ void rig_report(int fd, int code, const struct lumi_error *error)
 
     if (error && code != LUMI_OK)
         snprintf(report.text, sizeof report.text, "%s", error->text);
+    (void)!write(fd, &report, sizeof report);
+    close(fd);
+}
+
+void rig_report_drawing(int fd, double seconds)
+{
+    const struct rig_report report = {.code = LUMI_OK, .drawing = seconds};
+
     (void)!write(fd, &report, sizeof report);
     close(fd);
 }
@@ -207,6 +218,7 @@ static int hear(struct processes *p, struct child *child, struct lumi_error *err
         return lumi_fail(error, LUMI_ERR_IO, "the simulated rig: %s did not start", child->name);
     if (report.code != LUMI_OK)
         return lumi_fail(error, report.code, "the simulated rig: %s: %s", child->name, report.text);
+    p->drawing = report.drawing > p->drawing ? report.drawing : p->drawing;
     return LUMI_OK;
 }
 
@@ -352,7 +364,8 @@ static void remove_link(const struct sim_rig_processes *rig)
 
 int sim_rig_processes_run(const struct sim_rig_processes *rig, struct lumi_error *error)
 {
-    struct processes p = {.rig = rig, .life = {-1, -1}, .drive = {-1, -1}};
+    struct sim_rig_processes own = *rig;
+    struct processes p = {.rig = &own, .life = {-1, -1}, .drive = {-1, -1}};
     int code;
 
     if (rig->first_host < 1 || rig->first_host + rig->rig.camera_count + rig->drive > 254)
@@ -360,8 +373,12 @@ int sim_rig_processes_run(const struct sim_rig_processes *rig, struct lumi_error
                          rig->rig.camera_count);
     LUMI_TRY(rig_files_write(rig, error));
     code = start_all(&p, error);
+    if (own.position_time <= 0)
+        own.position_time = ceil(10 * fmax(p.drawing / POSITION_SHARE, POSITION_LEAST)) / 10;
+    if (code == LUMI_OK)
+        code = rig_plan_write(&own, error);
     if (code == LUMI_OK && rig->ready)
-        rig->ready(rig);
+        rig->ready(&own);
     if (code == LUMI_OK && rig->command)
         code = start_command(&p, error);
     if (code == LUMI_OK)

@@ -23,8 +23,10 @@ struct sim_rig_processes {
     double reference;                      /* s of exposure that make a picture as bright as the place is */
     const struct sim_fault_script *faults; /* or NULL */
     /* Into the files. */
-    double position_time, exposure; /* of the plan: start-stop */
-    char layout[16];                /* of lumid's frames: "raw", "jpeg", "rgb" */
+    bool continuous;      /* the plan's mode; otherwise start-stop */
+    double position_time; /* of the plan; 0: as long as drawing turns out to take, 2 s at least */
+    double exposure;
+    char layout[16]; /* of lumid's frames: "raw", "jpeg", "rgb" */
     int bits;
     double patience;     /* s, until a frame that does not come is taken again: drawing may be slow */
     int port;            /* of lumid's API */

@@ -62,6 +62,7 @@ static const struct form {
     {"camera %camera frames single", SIM_FAULT_FRAMES_DOUBLED, 0},
     {"camera %camera frames late @s", SIM_FAULT_FRAMES_LATE, 0},
     {"camera %camera packets lost @", SIM_FAULT_PACKETS_LOST, 0},
+    {"camera %camera askew @", SIM_FAULT_ASKEW, 0},
     {"drive alarm", SIM_FAULT_DRIVE_ALARM, 1},
     {"drive sound", SIM_FAULT_DRIVE_ALARM, 0},
     {"drive silent", SIM_FAULT_DRIVE_SILENT, 1},
@@ -118,6 +119,8 @@ static double most_of(enum sim_fault_kind kind)
         return 1;
     case SIM_FAULT_SUPPLY:
         return 100;
+    case SIM_FAULT_ASKEW:
+        return 90;
     case SIM_FAULT_SLIP:
         return 10000;
     case SIM_FAULT_CUT_IN_FLASH:

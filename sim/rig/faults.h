@@ -36,6 +36,7 @@ enum sim_fault_kind {
     SIM_FAULT_FRAMES_DOUBLED,
     SIM_FAULT_FRAMES_LATE,  /* value: s */
     SIM_FAULT_PACKETS_LOST, /* value: share */
+    SIM_FAULT_ASKEW,        /* value: degrees */
     SIM_FAULT_DRIVE_ALARM,
     SIM_FAULT_DRIVE_SILENT,
     SIM_FAULT_KINDS

@@ -98,6 +98,9 @@ static void camera(struct sim_fault_run *run, struct sim_machine *machine, const
     case SIM_FAULT_PACKETS_LOST:
         state->packets_lost = fault->value;
         break;
+    case SIM_FAULT_ASKEW:
+        state->askew = fault->value;
+        break;
     default:
         state->busy = fault->value;
     }

@@ -134,6 +134,7 @@ struct sim_camera_fault {
     bool frames_dropped, frames_doubled;
     double frames_late;  /* s */
     double packets_lost; /* share */
+    double askew;        /* degrees that it looks aside: somebody has run into it */
 };
 /* Of an industrial drive: for who plays it. */
 struct sim_drive_fault {

@@ -4,43 +4,22 @@
 # usage: sim_rig_test.sh LUMI LUMID
 set -eu
 lumi=$1 lumid=$2
-fail() {
-    echo "$*"
-    [ ! -f rig/lumid.log ] || tail -20 rig/lumid.log
-    exit 1
-}
+here=$(cd "$(dirname "$0")" && pwd)
+# shellcheck source=tests/scenario/rig_daemon.sh
+. "$here/rig_daemon.sh"
 
 # Called inside the rig's network.
 if [ "${3:-}" = operate ]; then
-    export LUMID_ADDRESS=http://localhost:8479
-    "$lumid" --config "$LUMI_SIM_RIG/lumid.conf" >"$LUMI_SIM_RIG/lumid.log" 2>&1 &
-    daemon=$!
-    trap 'kill $daemon 2>/dev/null; wait $daemon || true' EXIT
-    trap 'exit 1' INT TERM
-    tries=0
-    until "$lumi" capture status >status.txt 2>&1; do
-        tries=$((tries + 1))
-        [ $tries -lt 200 ] || fail "the daemon does not answer"
-        kill -0 $daemon || fail "the daemon has ended"
-        sleep 0.2
-    done
-    "$lumi" capture start "$LUMI_SIM_RIG/plan.txt" || fail "start"
-    "$lumi" capture watch >watch.txt 2>&1 &
-    wait $! || fail "$(tail -5 watch.txt)"
+    start_daemon 8479
+    start_capture
+    end_capture
     exit 0
 fi
 
+need_network
 rm -rf sim_rig_test.tmp
 mkdir sim_rig_test.tmp
 cd sim_rig_test.tmp
-here=$(dirname "$0")
-case $here in /*) ;; *) here=$OLDPWD/$here ;; esac
-probe=$("$lumi" sim rig object --rig arc:1x6:0.2 --size 32x32 -o probe --own-network -- true 2>&1) || {
-    echo "$probe"
-    case $probe in *namespace*) echo "skipped"; exit 77 ;; esac
-    fail "lumi sim rig does not start"
-}
-
 views="--rig arc:13x34:0.18 --scale 0.25 --size 96x77"
 # One camera loses packets, one sends frames twice: the capture is complete all the same.
 printf 'at shot 3 camera 0 packets lost 0.05\nat shot 4 camera 1 frames doubled for 3s\n' >faults.txt

@@ -2,10 +2,13 @@
 #include "proto/base/memory.h"
 #include "proto/capture/capture.h"
 #include "proto/image/image.h"
+#include "sim/camera.h"
+#include "sim/exposure.h"
 #include "sim/place.h"
 #include "sim/shoot.h"
 
 #include <glib.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -106,6 +109,83 @@ static void a_capture_holds_every_frame_with_its_true_pose(void **state)
     }
 }
 
+/* Sum of the squared differences between neighbours in rows. */
+static double detail(const struct lumi_raster *picture)
+{
+    double sum = 0;
+
+    for (int y = 0; y < picture->height; y++) {
+        const float *row = lumi_row_f32(picture, y);
+        for (int i = 3; i < 3 * picture->width; i++)
+            sum += (double)((row[i] - row[i - 3]) * (row[i] - row[i - 3]));
+    }
+    return sum;
+}
+
+static void a_rig_that_turns_smears_its_pictures_and_one_that_stands_does_not(void **state)
+{
+    struct fixture *f = *state;
+    struct sim_rig rig;
+    struct lumi_raster truth, still, there, back;
+
+    make_rig(&rig, "arc:3x6:0.2");
+    const struct sim_view *view = &rig.views[4];
+    struct sim_moment moment = {.angle = view->turn_angle, .drop = view->drop};
+    assert_int_equal(sim_camera_render(f->scene, &view->lens, &view->pose, 1, &truth, NULL, NULL), LUMI_OK);
+    assert_int_equal(sim_exposure_render(f->scene, &rig.profile, view->camera, &moment, 1, &still, NULL), LUMI_OK);
+    moment.moved = 0.3;
+    assert_int_equal(sim_exposure_render(f->scene, &rig.profile, view->camera, &moment, 1, &there, NULL), LUMI_OK);
+    moment.moved = -0.3;
+    assert_int_equal(sim_exposure_render(f->scene, &rig.profile, view->camera, &moment, 1, &back, NULL), LUMI_OK);
+    for (int y = 0; y < still.height; y++)
+        for (int i = 0; i < 3 * still.width; i++) {
+            assert_float_equal(lumi_row_f32(&still, y)[i], lumi_row_f32(&truth, y)[i], 1e-6);
+            assert_float_equal(lumi_row_f32(&there, y)[i], lumi_row_f32(&back, y)[i], 1e-4);
+        }
+    assert_true(detail(&there) < 0.9 * detail(&still));
+    lumi_raster_finish(&truth);
+    lumi_raster_finish(&still);
+    lumi_raster_finish(&there);
+    lumi_raster_finish(&back);
+    sim_rig_finish(&rig);
+}
+
+static void sensor_values_are_a_file_that_develops_to_the_picture(void **state)
+{
+    struct fixture *f = *state;
+    struct sim_rig rig;
+    struct sim_output output;
+    struct lumi_raster picture, developed, light = {0};
+    uint8_t *data;
+    size_t size;
+    double sum = 0, sum_developed = 0;
+
+    make_rig(&rig, "planar:2x3:0.05");
+    sim_output_init(&output);
+    output.format = SIM_FORMAT_DNG;
+    assert_string_equal(sim_format_extension(output.format), ".dng");
+    assert_int_equal(sim_view_encode(f->scene, &rig.views[0], 0, &output, NULL, &data, &size, NULL), LUMI_OK);
+    g_autofree char *path = g_strdup_printf("%s/view.dng", f->dir);
+    assert_true(g_file_set_contents(path, (const char *)data, (gssize)size, NULL));
+    lumi_free(data);
+    assert_int_equal(lumi_image_read(path, 3, &developed, NULL, NULL), LUMI_OK);
+    assert_int_equal(sim_camera_render(f->scene, &rig.views[0].lens, &rig.views[0].pose, 1, &picture, NULL, NULL),
+                     LUMI_OK);
+    lumi_raster_convert(&developed, LUMI_F32, &light);
+    assert_int_equal(developed.width, picture.width);
+    assert_int_equal(developed.height, picture.height);
+    for (int y = 4; y < picture.height - 4; y++)
+        for (int i = 12; i < 3 * picture.width - 12; i++) {
+            sum += (double)lumi_row_f32(&picture, y)[i];
+            sum_developed += (double)lumi_row_f32(&light, y)[i];
+        }
+    assert_true(fabs(sum_developed / sum - 1) < 0.03);
+    lumi_raster_finish(&picture);
+    lumi_raster_finish(&developed);
+    lumi_raster_finish(&light);
+    sim_rig_finish(&rig);
+}
+
 static void views_can_be_given_one_by_one(void **state)
 {
     struct sim_rig from, rig = {0};
@@ -167,6 +247,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_capture_holds_every_frame_with_its_true_pose),
+        cmocka_unit_test(a_rig_that_turns_smears_its_pictures_and_one_that_stands_does_not),
+        cmocka_unit_test(sensor_values_are_a_file_that_develops_to_the_picture),
         cmocka_unit_test(views_can_be_given_one_by_one),
         cmocka_unit_test(truth_writes_the_bytes_again_for_any_number_of_threads),
     };
