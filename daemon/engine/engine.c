@@ -223,9 +223,13 @@ void engine_incident(struct lumi_engine *e, int camera, const char *kind, const 
     vsnprintf(text, sizeof text, format, list);
     va_end(list);
     engine_tell(e, LUMI_TALE_INCIDENT, -1, camera, text);
-    if (!e->store)
-        return;
-    struct engine_flight *flight = engine_flight(e, LUMI_STORE_INCIDENT);
+    engine_incident_row(e, camera, kind, text);
+}
+
+void engine_incident_row(struct lumi_engine *e, int camera, const char *kind, const char *text)
+{
+    struct engine_flight *flight = e->store ? engine_flight(e, LUMI_STORE_INCIDENT) : NULL;
+
     if (!flight)
         return;
     snprintf(flight->job.text, sizeof flight->job.text, "%s", text);

@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define SMEAR_ALIKE 0.3   /* of its length: what two measurements of one smear differ by at most */
+#define SMEAR_TURNED 0.35 /* radians */
+
 static void picture_drop(struct engine_picture *picture)
 {
     if (!picture || --picture->users > 0)
@@ -188,9 +191,11 @@ static void write_verdict(struct lumi_engine *e, const struct engine_judging *jo
     struct engine_flight *flight = engine_flight(e, LUMI_STORE_JUDGED);
 
     frame->dead_row = !accepted;
-    if (!accepted)
-        engine_incident(e, job->camera, "rejected", "shot %d of %s: %s", job->shot, e->config.cameras[job->camera].name,
-                        reason);
+    if (!accepted) { /* told with the frame below */
+        char text[400];
+        snprintf(text, sizeof text, "shot %d of %s: %s", job->shot, e->config.cameras[job->camera].name, reason);
+        engine_incident_row(e, job->camera, "rejected", text);
+    }
     engine_frame_go(e, job->shot, job->camera, accepted ? AT_ACCEPTED : AT_REJECTED, reason);
     if (!flight)
         return;
@@ -208,6 +213,38 @@ static void write_verdict(struct lumi_engine *e, const struct engine_judging *jo
                                                             .moved = numbers ? numbers->moved : NAN};
     snprintf(flight->job.text, sizeof flight->job.text, "%s", reason);
     engine_flight_give(e, flight);
+}
+
+/* A smear that a retake shows again, as long and in the same direction, is no accident of the moment: the place looks
+ * so (rails, grass, a striped carpet), or the sweep is too fast, which the preflight told. A third picture would show
+ * it, too. */
+static bool is_as_smeared(const struct engine_frame *frame, const struct lumi_judge_numbers *numbers)
+{
+    const double turned = fabs(remainder(numbers->blur_angle - (double)frame->smear_angle, LUMI_PI));
+
+    return frame->smear > 0 && fabs(numbers->blur_pixels / (double)frame->smear - 1) < SMEAR_ALIKE &&
+           turned < SMEAR_TURNED;
+}
+
+static bool is_accepted(struct lumi_engine *e, const struct engine_judging *job,
+                        const struct lumi_judge_numbers *numbers, char *reason, size_t size)
+{
+    struct engine_camera *c = e->cameras + job->camera;
+    struct engine_frame *frame = engine_frame_at(e, job->shot, job->camera);
+    const double usual = lumi_judge_usual_sharpness(&c->usual);
+    struct lumi_judge_limits limits = e->config.judge;
+    bool accepted = lumi_judge_verdict(numbers, &limits, usual, reason, size);
+
+    if (!accepted && numbers->blur_pixels > limits.blur_pixels && is_as_smeared(frame, numbers)) {
+        limits.blur_pixels = INFINITY;
+        accepted = lumi_judge_verdict(numbers, &limits, usual, reason, size);
+        if (accepted)
+            snprintf(reason, size, "as smeared as the time before, over %.1f pixels: the place looks so",
+                     numbers->blur_pixels);
+    }
+    frame->smear = (float)numbers->blur_pixels;
+    frame->smear_angle = (float)numbers->blur_angle;
+    return accepted;
 }
 
 static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int code, const char *text,
@@ -231,8 +268,7 @@ static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int 
                         e->config.cameras[job->camera].name, text ? text : "");
         return;
     }
-    accepted =
-        lumi_judge_verdict(numbers, &e->config.judge, lumi_judge_usual_sharpness(&c->usual), reason, sizeof reason);
+    accepted = is_accepted(e, job, numbers, reason, sizeof reason);
     if (accepted)
         lumi_judge_usual_add(&c->usual, numbers->sharpness);
     write_verdict(e, job, accepted, numbers, reason);

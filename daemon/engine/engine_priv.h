@@ -70,9 +70,10 @@ struct engine_frame {
     bool flying;        /* its row is wanted of the store (retake) */
     bool judge_due;     /* stored, to be judged from its file */
     bool judging;
-    bool stuck;   /* the store makes no row for another attempt */
-    int retakes;  /* rows before this one */
-    char *reason; /* NULL: none */
+    bool stuck;               /* the store makes no row for another attempt */
+    int retakes;              /* rows before this one */
+    float smear, smear_angle; /* of the picture judged last: pixels, radians; 0: none */
+    char *reason;             /* NULL: none */
 };
 
 enum engine_shot_state { SHOT_PLANNED = 0, SHOT_FIRED, SHOT_LOST };
@@ -291,6 +292,8 @@ int64_t engine_unix_us(const struct lumi_engine *e, int64_t host_ns);
 /* A line for the capture's log and for whoever listens; camera −1: none. */
 void engine_incident(struct lumi_engine *e, int camera, const char *kind, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
+/* The row only: it is told otherwise. */
+void engine_incident_row(struct lumi_engine *e, int camera, const char *kind, const char *text);
 char *engine_copy(const char *text); /* lumi_free; NULL for NULL or no memory */
 
 /* ---- engine_rig.c ---- */

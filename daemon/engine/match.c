@@ -11,7 +11,7 @@
 #define PRIOR_SLACK 0.15  /* before any frame of a sweep was matched */
 #define FIRST_LATENCY 0.5 /* s, of a camera of which nothing is known */
 #define STRAYS 2          /* frames of no exposure one after another, while exposures want one: the clock is wrong */
-#define LATE_LEAST 0.25   /* s over the usual delay until a frame is called late */
+#define LATE_SHARE 0.05   /* of the patience, over twice the usual delay, until a frame is called late */
 
 void lumi_match_options_init(struct lumi_match_options *options)
 {
@@ -370,7 +370,7 @@ static void hit(struct lumi_match *match, int i, const struct lumi_match_frame *
                                          .gap = frame->gap,
                                          .latency = (double)(frame->host_ns - e->at) * 1e-9};
     result->out_of_order = match->last > i;
-    result->late = match->latency > 0 && result->latency > 2 * match->latency + LATE_LEAST;
+    result->late = match->latency > 0 && result->latency > 2 * match->latency + LATE_SHARE * match->options.patience;
     if (match->period > 0)
         result->late = result->out_of_order = false;
     else

@@ -244,9 +244,12 @@ static void give_verdict(struct bench *b, const struct bench_due *thing)
                                          .exposure_stops = NAN,
                                          .shift_pixels = NAN,
                                          .moved = NAN,
+                                         .blur_pixels = b->smears[0],
+                                         .blur_angle = 0.4,
                                          .clipped = b->verdict_rejects > 0 ? 0.9 : 0.01};
 
     b->verdict_rejects -= b->verdict_rejects > 0;
+    memmove(b->smears, b->smears + 1, sizeof b->smears - sizeof b->smears[0]);
     lumi_engine_judged(b->engine, b->now, thing->id, LUMI_OK, "", &numbers, NULL);
 }
 

@@ -63,6 +63,7 @@ struct bench {
     char handed[1024], last_incident[512];
     unsigned states_told;           /* a bit each */
     int incidents, verdict_rejects; /* the judge rejects so many more */
+    double smears[4];               /* pixels that it finds in the next ones, until 0 */
     struct lumi_engine_status status;
 };
 

@@ -114,6 +114,37 @@ static void a_frame_that_is_judged_bad_is_taken_again(void **state)
     end_whole(&b);
 }
 
+/* One frame of a sweep is found smeared, and so is what is taken of it again. */
+static void take_smeared(struct bench *b, const double smears[2], int rounds)
+{
+    bench_begin(b, LUMI_PLAN_START_STOP, 1);
+    start(b);
+    assert_true(bench_until(b, LUMI_ENGINE_SWEEPING, 100));
+    b->smears[0] = smears[0];
+    assert_true(bench_until(b, LUMI_ENGINE_ARMING, 200));
+    b->smears[0] = smears[1];
+    assert_complete(b, 400);
+    assert_int_equal(b->status.accepted, 8);
+    assert_int_equal(b->status.round, rounds);
+    end_whole(b);
+}
+
+static void a_smear_that_is_there_again_is_the_place_s(void **state)
+{
+    static struct bench b;
+
+    (void)state;
+    take_smeared(&b, (const double[2]){4.4, 4.2}, 1);
+}
+
+static void a_smear_of_another_length_is_taken_once_more(void **state)
+{
+    static struct bench b;
+
+    (void)state;
+    take_smeared(&b, (const double[2]){4.4, 9}, 2);
+}
+
 static void exchanged_trigger_wires_are_red_and_start_nothing(void **state)
 {
     struct bench b;
@@ -574,6 +605,8 @@ int main(void)
         cmocka_unit_test(a_frame_that_never_comes_is_taken_again),
         cmocka_unit_test(late_doubled_damaged_and_wrongly_exposed_frames_are_found),
         cmocka_unit_test(a_frame_that_is_judged_bad_is_taken_again),
+        cmocka_unit_test(a_smear_that_is_there_again_is_the_place_s),
+        cmocka_unit_test(a_smear_of_another_length_is_taken_once_more),
         cmocka_unit_test(exchanged_trigger_wires_are_red_and_start_nothing),
         cmocka_unit_test(a_test_frame_that_comes_once_more_is_not_the_next_trigger_s),
         cmocka_unit_test(one_lost_test_frame_is_no_broken_trigger_two_are),
