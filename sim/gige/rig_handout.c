@@ -71,15 +71,13 @@ static int write_configuration(const struct sim_rig_processes *rig, struct lumi_
 
     if (mkdir(captures, 0777) != 0 && access(captures, W_OK) != 0)
         return lumi_fail_errno(error, captures, "making the folder");
-    /* Drawing is slower than a camera, and several share a processor: a frame may be late. Small pictures of plain
-     * walls say little about sharpness and exposure. */
+    /* Drawing is slower than a camera, and several share a processor: a frame may be late. */
     g_string_append_printf(text, "\n[rig]\nlink = serial:%s/board\n", rig->folder);
     if (rig->drive)
         describe_drive(rig, text);
     g_string_append_printf(text,
                            "\n[capture]\nfolder = %s\nframe_patience_s = %g\n"
-                           "memory = 256M\n\n[judge]\nclipped = 0.9\nsharpness_share = 0\nexposure_stops = "
-                           "20\nblur_pixels = 1000\n\n[http]\nlisten = localhost:%d\n",
+                           "memory = 256M\n\n[http]\nlisten = localhost:%d\n",
                            captures, rig->patience, rig->port);
     if (rig->process)
         g_string_append_printf(text, "\n[process]\ncommand = %s\n", rig->process);
