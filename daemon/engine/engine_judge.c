@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SMEAR_ALIKE 0.3   /* of its length: what two measurements of one smear differ by at most */
-#define SMEAR_TURNED 0.35 /* radians */
+#define SMEAR_ALIKE 0.1  /* of its length: what two measurements of one smear differ by at most */
+#define SMEAR_TURNED 0.1 /* radians */
 
 static void picture_drop(struct engine_picture *picture)
 {

@@ -25,11 +25,23 @@ state() { # what its status says of the state: one word
     "$lumi" capture status >status.txt 2>&1 || fail "no status: $(cat status.txt)"
     sed -n 's/^state  *\([a-z]*\).*/\1/p' status.txt
 }
-# Numbers that are the same in every run: seconds until the next kill.
+# Until the next kill: two of three come when some more frames were told of, the third whatever is under way then. The
+# numbers are the same in every run.
 seed=7
+frames_told() {
+    grep -c '"frame"' events.txt || :
+}
 moment() {
     seed=$(((seed * 1103515245 + 12345) % 2147483648))
-    wait=$(awk -v n="$seed" 'BEGIN { printf "%.2f", 0.1 + 4.4 * (n / 2147483648) ^ 1.5 }')
+    if [ $((killed % 3)) -gt 0 ]; then
+        frames=$(($(frames_told) + 1 + seed / 65536 % 5))
+        tries=0
+        while [ "$(frames_told)" -lt $frames ] && [ $tries -lt 300 ] && [ "$(state)" != done ]; do
+            tries=$((tries + 1))
+            sleep 0.05
+        done
+    fi
+    sleep "$(awk -v n="$seed" -v most=$((killed % 3 ? 1 : 5)) 'BEGIN { printf "%.2f", most * (n / 2147483648) ^ 2 }')"
 }
 begin() { # NAME; a frame of a test may be lost on a busy computer
     tries=0
@@ -72,7 +84,6 @@ take() { # NAME
     here=0
     while [ $killed -lt "$kills" ] && [ $here -lt 10 ]; do
         moment
-        sleep "$wait"
         now=$(state)
         if [ "$now" = done ] || [ "$now" = idle ]; then
             break
@@ -94,6 +105,8 @@ take() { # NAME
 }
 
 if [ "${5:-}" = operate ]; then
+    # Of so small pictures nothing is to be judged.
+    printf '\n[judge]\nblur_pixels = 1000\nexposure_stops = 20\nsharpness_share = 0\n' >>"$LUMI_SIM_RIG/lumid.conf"
     export LUMID_ADDRESS=http://localhost:8483
     daemon='' watch='' killed=0 captures=0 proven=0
     trap 'kill -9 $daemon $watch 2>/dev/null || :' EXIT
@@ -119,7 +132,7 @@ need_network
 rm -rf lumid_kill_test.tmp
 mkdir lumid_kill_test.tmp
 cd lumid_kill_test.tmp
-"$lumi" sim rig object --rig arc:2x10:0.2 --size 32x32 -o rig --seed 5 --position-time 1.6 --patience 60 --port 8483 \
+"$lumi" sim rig object --rig arc:2x10:0.2 --size 32x32 --white 0.008 -o rig --seed 5 --position-time 1.6 --patience 60 --port 8483 \
     --own-network -- sh "$here/lumid_kill_test.sh" "$lumi" "$lumid" "$capture_kept" "$kills" operate ||
     fail "the rig ended badly"
 for capture in rig/captures/take-*; do

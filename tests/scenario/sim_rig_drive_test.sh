@@ -26,7 +26,7 @@ mkdir sim_rig_drive_test.tmp
 cd sim_rig_drive_test.tmp
 # A camera's first two triggers are tests.
 printf 'at shot 5 drive silent for 3s\nat shot 8 drive alarm for 500ms\n' >faults.txt
-"$lumi" sim rig object --rig arc:4x8:0.2 --size 48x48 -o rig --drive --position-time 2 --patience 8 --port 8481 \
+"$lumi" sim rig object --rig arc:4x8:0.2 --size 48x48 --white 0.008 -o rig --drive --position-time 2 --patience 8 --port 8481 \
     --faults faults.txt --own-network -- sh "$here/sim_rig_drive_test.sh" "$lumi" "$lumid" operate ||
     fail "the rig ended badly"
 grep -q "the drive: .*no answer" rig/lumid.log || fail "nobody noticed the silence"

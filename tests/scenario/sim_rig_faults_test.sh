@@ -28,7 +28,7 @@ at shot 14 camera 2 frames late 1.2s for 2.5s
 at shot 16 camera 3 exposure 4 for 2.5s
 at shot 18 link cut for 8s
 EOF
-"$lumi" sim rig object --rig arc:4x16:0.2 --size 48x48 -o rig --position-time 2 --patience 6 --port 8482 \
+"$lumi" sim rig object --rig arc:4x16:0.2 --size 48x48 --white 0.008 -o rig --position-time 2 --patience 6 --port 8482 \
     --faults faults.txt --own-network -- sh "$here/sim_rig_faults_test.sh" "$lumi" "$lumid" operate ||
     fail "the rig ended badly"
 capture=$(echo rig/captures/*.capture)

@@ -439,8 +439,10 @@ void world_judge(struct world *w, const struct lumi_engine_judge_job *job)
         .sharpness = 0.5, .blur_pixels = 0.3, .clipped = 0.01, .dark = 0.01, .mean = 0.4, .shift_pixels = NAN};
     e->numbers.exposure_stops = job->neighbour_count > 0 ? 0 : NAN;
     /* It sees blur, nothing else: damage and wrong exposures are the engine's to find, by what the camera says. */
-    if (truth.flaws & WORLD_BLURRED)
-        e->numbers.blur_pixels = 9;
+    if (truth.flaws & WORLD_BLURRED) { /* no two of one length and direction */
+        e->numbers.blur_pixels = 4 + 8 * fmod((double)job->id * 0.7549, 1);
+        e->numbers.blur_angle = LUMI_PI * fmod((double)job->id * 0.5698, 1);
+    }
 }
 
 static void judged(struct world *w, struct world_event *e)
