@@ -127,8 +127,7 @@ struct lumi_engine_ports {
     void (*drive_check)(void *context, uint32_t number);
     /* Answered by a notice of LUMI_CAMERA_DONE. */
     void (*camera_command)(void *context, int camera, uint32_t number, const struct lumi_camera_command *command);
-    void (*camera_power)(void *context, int camera, bool on);              /* NULL: there is no line for it */
-    void (*lamp)(void *context, bool on);                                  /* NULL likewise */
+    void (*lamp)(void *context, bool on);                                  /* NULL: there is no line for it */
     void (*judge)(void *context, const struct lumi_engine_judge_job *job); /* answered by lumi_engine_judged */
     void (*hand_over)(void *context, const char *capture);
     void (*told)(void *context, const struct lumi_engine_told *told);

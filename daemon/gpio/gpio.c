@@ -221,6 +221,7 @@ int lumi_gpio_open(const struct lumi_gpio_line *lines, int count, const struct l
     pthread_mutex_init(&made->holding, NULL);
     for (int i = 0; i < count && code == LUMI_OK; i++) {
         made->lines[i] = lines[i];
+        made->wanted[i] = lines[i].role == LUMI_GPIO_POWER;
         code = lumi_gpio_hold(&lines[i], &made->held[i], error);
         made->count += code == LUMI_OK;
     }

@@ -40,7 +40,8 @@ struct lumi_gpio_options {
 };
 /* Asks for the lines. LUMI_ERR_NOTFOUND (no such chip or line), LUMI_ERR_BUSY (somebody's), each naming the line. An
  * e-stop that is pressed already is reported at once; one whose chip goes away counts as pressed. A chip that comes
- * back is taken again, outputs as they were; then an e-stop is what its line says. Edges in between are not told. */
+ * back is taken again, outputs as they were; then an e-stop is what its line says. Edges in between are not told. Power
+ * is on from here on, a lamp off. */
 int lumi_gpio_open(const struct lumi_gpio_line *lines, int count, const struct lumi_gpio_options *options,
                    struct lumi_gpio **gpio, struct lumi_error *error);
 void lumi_gpio_close(struct lumi_gpio *gpio);                             /* outputs go inactive; NULL is fine */

@@ -38,7 +38,8 @@ int lumi_gpio_hold(const struct lumi_gpio_line *line, struct lumi_gpio_held **he
         code = lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: the chip has no such line", text);
     else if ((line->role == LUMI_GPIO_ESTOP || line->role == LUMI_GPIO_SYNC
                   ? gpiod_line_request_both_edges_events_flags(made->line, LUMI_GPIO_CONSUMER, flags)
-                  : gpiod_line_request_output_flags(made->line, LUMI_GPIO_CONSUMER, flags, 0)) < 0)
+                  : gpiod_line_request_output_flags(made->line, LUMI_GPIO_CONSUMER, flags,
+                                                    line->role == LUMI_GPIO_POWER)) < 0)
         code = errno == EBUSY ? lumi_fail(error, LUMI_ERR_BUSY, "%s: another program has it", text)
                               : lumi_fail(error, LUMI_ERR_IO, "%s: it cannot be had: %s", text, strerror(errno));
     if (code == LUMI_OK)

@@ -64,7 +64,8 @@ static struct gpiod_line_settings *settings_for(const struct lumi_gpio_line *lin
         gpiod_line_settings_set_event_clock(settings, GPIOD_LINE_CLOCK_MONOTONIC);
         gpiod_line_settings_set_debounce_period_us(settings, (unsigned long)line->debounce_us);
     } else
-        gpiod_line_settings_set_output_value(settings, GPIOD_LINE_VALUE_INACTIVE);
+        gpiod_line_settings_set_output_value(settings, line->role == LUMI_GPIO_POWER ? GPIOD_LINE_VALUE_ACTIVE
+                                                                                     : GPIOD_LINE_VALUE_INACTIVE);
     return settings;
 }
 

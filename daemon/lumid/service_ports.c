@@ -13,36 +13,14 @@ static void camera_command(void *context, int camera, uint32_t number, const str
     lumi_camera_host_command(((struct lumi_service *)context)->hosts[camera], number, command);
 }
 
-static void set_lines(struct lumi_service *service, enum lumi_gpio_role role, int camera, bool on)
-{
-    const struct lumi_config *config = service->config;
-    struct lumi_error error = {0};
-    bool own = false;
-
-    for (int i = 0; i < config->gpio_count; i++)
-        own = own || (config->gpio[i].role == role && service->gpio_camera[i] == camera);
-    for (int i = 0; i < config->gpio_count; i++)
-        if (config->gpio[i].role == role && service->gpio_camera[i] == (own ? camera : -1) &&
-            lumi_gpio_set(service->gpio, i, on, &error) != LUMI_OK)
-            lumi_service_log(4, "%s", error.text);
-}
-
-static void camera_power(void *context, int camera, bool on)
-{
-    set_lines(context, LUMI_GPIO_POWER, camera, on);
-}
-
 static void lamp(void *context, bool on)
 {
-    set_lines(context, LUMI_GPIO_LAMP, -1, on);
-}
+    struct lumi_service *service = context;
+    struct lumi_error error = {0};
 
-static bool has_line(const struct lumi_config *config, enum lumi_gpio_role role)
-{
-    for (int i = 0; i < config->gpio_count; i++)
-        if (config->gpio[i].role == role)
-            return true;
-    return false;
+    for (int i = 0; i < service->config->gpio_count; i++)
+        if (service->config->gpio[i].role == LUMI_GPIO_LAMP && lumi_gpio_set(service->gpio, i, on, &error) != LUMI_OK)
+            lumi_service_log(4, "%s", error.text);
 }
 
 /* ---- judging ---- */
@@ -164,10 +142,7 @@ void lumi_service_ports(struct lumi_service *service, struct lumi_engine_ports *
     ports->context = service;
     lumi_service_rig_ports(service, ports);
     ports->camera_command = camera_command;
-    if (has_line(service->config, LUMI_GPIO_POWER))
-        ports->camera_power = camera_power;
-    if (has_line(service->config, LUMI_GPIO_LAMP))
-        ports->lamp = lamp;
+    ports->lamp = lamp;
     ports->judge = judge;
     ports->hand_over = hand_over;
     ports->told = told;

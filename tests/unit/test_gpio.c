@@ -124,7 +124,9 @@ static int answer_second(int fd, unsigned long request, void *argument)
         lines[asked->offsets[0]].active_low = asked->config.flags & GPIO_V2_LINE_FLAG_ACTIVE_LOW;
         lines[asked->offsets[0]].output = asked->config.flags & GPIO_V2_LINE_FLAG_OUTPUT;
         for (uint32_t i = 0; i < asked->config.num_attrs; i++)
-            if (asked->config.attrs[i].attr.id == GPIO_V2_LINE_ATTR_ID_DEBOUNCE)
+            if (asked->config.attrs[i].attr.id == GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES)
+                lines[asked->offsets[0]].value = asked->config.attrs[i].attr.values & 1;
+            else if (asked->config.attrs[i].attr.id == GPIO_V2_LINE_ATTR_ID_DEBOUNCE)
                 lines[asked->offsets[0]].debounce = asked->config.attrs[i].attr.debounce_period_us;
         return 0;
     case GPIO_V2_LINE_GET_VALUES_IOCTL:
@@ -451,6 +453,23 @@ static void outputs_are_switched_and_left_inactive(void **state)
     assert_false(lines[6].value);
 }
 
+static void power_is_on_as_long_as_the_line_is_held(void **state)
+{
+    const struct lumi_gpio_line both[] = {{.role = LUMI_GPIO_POWER, .chip = "gpiochip0", .offset = 7}, estop};
+    struct lumi_gpio *gpio = open_lines(both, 2);
+
+    (void)state;
+    assert_true(lines[7].output && lines[7].value);
+    unplug(3);
+    await(&heard.presses, 1);
+    plug(7);
+    plug(3);
+    await(&heard.releases, 1);
+    assert_true(lines[7].held && lines[7].value);
+    lumi_gpio_close(gpio);
+    assert_false(lines[7].value);
+}
+
 static void polarity_and_debouncing_are_asked_of_the_kernel(void **state)
 {
     struct lumi_gpio_line line = estop;
@@ -522,6 +541,7 @@ int main(void)
         TEST(an_emergency_stop_whose_chip_goes_away_counts_as_pressed),
         TEST(a_chip_that_comes_back_is_taken_again_and_its_outputs_are_as_they_were),
         TEST(outputs_are_switched_and_left_inactive),
+        TEST(power_is_on_as_long_as_the_line_is_held),
         TEST(polarity_and_debouncing_are_asked_of_the_kernel),
         TEST(a_chip_is_found_by_its_label),
         TEST(a_line_that_cannot_be_had_is_named),
