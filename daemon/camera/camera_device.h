@@ -172,5 +172,7 @@ int lumi_camera_list(struct lumi_camera_identity *cameras, int max, struct lumi_
 int lumi_camera_address_check(const char *address, struct lumi_error *error); /* without looking for the camera */
 int lumi_camera_open(const char *address, struct lumi_camera **camera, struct lumi_error *error);
 void lumi_camera_close(struct lumi_camera *camera); /* NULL is fine */
+/* Files of cameras that record by themselves, in order of their names, numbers in them by value; as strcmp. */
+int lumi_camera_file_order(const char *a, const char *b);
 
 #endif

@@ -55,8 +55,6 @@ int files_watch_scan(struct files_watch *watch, int64_t now_ns, struct lumi_erro
 int files_watch_skip(struct files_watch *watch, struct lumi_error *error);
 /* The next file, whole and in order; it counts as taken from now on. False: none. Valid until the next scan. */
 bool files_watch_next(struct files_watch *watch, int64_t now_ns, struct files_item **item);
-/* In order of names, numbers in them by value. */
-int files_order(const char *a, const char *b);
 /* The number that a camera gave the file: the last digits before its extension; 0: none. */
 uint64_t files_number(const char *path);
 

@@ -25,7 +25,7 @@
 #define MATES_NS 10000000000     /* between a raw file and its JPEG */
 #define FILES_MOST 200000
 
-int files_order(const char *a, const char *b)
+int lumi_camera_file_order(const char *a, const char *b)
 {
     while (*a && *b) {
         if (isdigit((unsigned char)*a) && isdigit((unsigned char)*b)) {
@@ -187,7 +187,7 @@ static int walk(struct scan *scan, const char *below, int depth)
 static int by_path(const void *a, const void *b)
 {
     const struct files_item *x = a, *y = b;
-    int order = files_order(x->path, y->path);
+    int order = lumi_camera_file_order(x->path, y->path);
 
     return order ? order : strcmp(x->path, y->path);
 }

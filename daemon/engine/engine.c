@@ -112,6 +112,17 @@ void engine_go(struct lumi_engine *e, enum engine_stage stage)
     engine_ask_none(e);
 }
 
+/* On while the rig may move. */
+static void light_lamp(struct lumi_engine *e)
+{
+    const bool lit = e->moving || (e->home_wanted && !engine_board_rests(e)) || e->state == LUMI_ENGINE_HOMING ||
+                     e->state == LUMI_ENGINE_SWEEPING || e->state == LUMI_ENGINE_PAUSING;
+
+    if (lit != e->lit && e->ports.lamp)
+        e->ports.lamp(e->ports.context, lit);
+    e->lit = lit;
+}
+
 void engine_step(struct lumi_engine *e)
 {
     if (e->stepping)
@@ -125,6 +136,7 @@ void engine_step(struct lumi_engine *e)
     engine_watch(e);
     for (int i = 0; i < 64 && stages[e->stage] && stages[e->stage](e); i++)
         ;
+    light_lamp(e);
     e->stepping = false;
 }
 
@@ -207,8 +219,6 @@ void engine_state(struct lumi_engine *e, enum lumi_engine_state state, const cha
     va_end(list);
     if (e->state == state && !strcmp(text, e->text))
         return;
-    if (e->ports.lamp && (state == LUMI_ENGINE_SWEEPING) != (e->state == LUMI_ENGINE_SWEEPING))
-        e->ports.lamp(e->ports.context, state == LUMI_ENGINE_SWEEPING);
     e->state = state;
     memcpy(e->text, text, sizeof text);
     engine_tell(e, LUMI_TALE_STATE, -1, -1, text);

@@ -169,6 +169,8 @@ int lumi_engine_stop(struct lumi_engine *e, int64_t now_ns, bool at_once, bool s
     e->want_stop = true;
     e->want_seal = seal;
     e->stop_at_once = at_once;
+    for (int c = 0; c < e->config.camera_count && e->stage == STAGE_DRAIN; c++) /* no more files are waited for */
+        e->cameras[c].given_up |= e->cameras[c].identity.records_itself;
     if (e->stage != STAGE_START && e->stage != STAGE_SWEEP && e->stage != STAGE_PAUSED &&
         e->stage != STAGE_INTERRUPTED && e->stage != STAGE_AFTER && e->stage != STAGE_DRAIN) {
         if (!engine_board_rests(e) && e->connected) { /* homing, or about to start */

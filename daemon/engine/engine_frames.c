@@ -38,7 +38,7 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
 
     if (!frame)
         return;
-    if (e->stage == STAGE_TRIGGERS || (e->stage == STAGE_TEST && e->test_camera >= 0)) {
+    if (e->stage == STAGE_TRIGGERS || (e->stage == STAGE_TEST && e->test_camera >= 0 && !c->identity.records_itself)) {
         engine_test_frame(e, camera, frame);
         return;
     }
@@ -318,7 +318,8 @@ void engine_match_begin(struct lumi_engine *e)
 
 static int by_path(const void *a, const void *b)
 {
-    return strcmp((*(struct engine_held *const *)a)->frame->path, (*(struct engine_held *const *)b)->frame->path);
+    return lumi_camera_file_order((*(struct engine_held *const *)a)->frame->path,
+                                  (*(struct engine_held *const *)b)->frame->path);
 }
 
 /* All that has come, against all shots that were fired and have no file of this camera. */

@@ -299,7 +299,8 @@ static bool find(const struct lumi_engine *e, bool (*wanted)(const char *path), 
     char best[256] = "", path[1400];
 
     while (folder && (entry = readdir(folder))) {
-        if (entry->d_name[0] == '.' || strcmp(entry->d_name, best) <= 0)
+        const char *dot = strrchr(entry->d_name, '.'); /* NAME.partial: what is being taken in */
+        if (entry->d_name[0] == '.' || strcmp(entry->d_name, best) <= 0 || (dot && !strcmp(dot, ".partial")))
             continue;
         snprintf(path, sizeof path, "%s/%s", e->config.folder, entry->d_name);
         if (wanted(path))

@@ -186,6 +186,7 @@ struct lumi_engine {
     enum lumi_engine_state state;
     char text[512];
     bool stepping;
+    bool lit; /* the lamp */
 
     enum engine_stage stage;
     int64_t stage_ns; /* since when */

@@ -278,6 +278,7 @@ static void connected(struct lumi_engine *e, bool restarted)
     e->event_count = 0;
     e->link.status_known = false;
     e->faults = 0;
+    e->home_wanted = false;
     engine_restarted(e);
 }
 

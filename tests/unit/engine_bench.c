@@ -428,6 +428,11 @@ void bench_restart_board(struct bench *b)
     lumi_engine_rig_notice(b->engine, b->now, &heard);
 }
 
+static void lamp(void *context, bool on)
+{
+    ((struct bench *)context)->lit = on;
+}
+
 void bench_engine(struct bench *b)
 {
     const struct lumi_engine_ports ports = {.context = b,
@@ -437,6 +442,7 @@ void bench_engine(struct bench *b)
                                             .rig_emergency_stop = emergency_stop,
                                             .rig_to_host = to_host,
                                             .camera_command = command,
+                                            .lamp = lamp,
                                             .judge = judge,
                                             .hand_over = hand_over,
                                             .drive_check = b->drive_says ? drive_check : NULL,

@@ -40,6 +40,7 @@ struct bench {
     bool connected, known;
     int64_t sweep_until;
     int starts, homes;
+    bool lit;
     uint32_t home_turn; /* that the last one was told */
     /* the cameras */
     int64_t clock_offset[BENCH_CAMERAS];

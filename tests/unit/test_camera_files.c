@@ -226,9 +226,9 @@ static void numbers_are_read_from_names(void **state)
     assert_int_equal(files_number("DCIM/100/DSC01234.ARW"), 1234);
     assert_int_equal(files_number("GX010042.MP4"), 10042);
     assert_int_equal(files_number("picture.jpg"), 0);
-    assert_true(files_order("a2", "a10") < 0);
-    assert_true(files_order("a10b", "a10") > 0);
-    assert_int_equal(files_order("a1", "a1"), 0);
+    assert_true(lumi_camera_file_order("a2", "a10") < 0);
+    assert_true(lumi_camera_file_order("a10b", "a10") > 0);
+    assert_int_equal(lumi_camera_file_order("a1", "a1"), 0);
 }
 
 /* ---- through the interface ---- */

@@ -255,7 +255,7 @@ static void a_retake_needs_no_name(void **state)
 {
     struct lumi_error error = {0};
     struct bench b;
-    char path[1024];
+    char path[1024], partial[1040];
 
     (void)state;
     bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
@@ -269,6 +269,35 @@ static void a_retake_needs_no_name(void **state)
     assert_int_equal(lumi_engine_retake(b.engine, b.now, NULL, NULL, &error), LUMI_ERR_NOTFOUND);
     assert_non_null(strstr(error.text, "nothing is missing"));
     assert_memory_equal(error.text, path, strlen(path));
+    /* What is being taken in beside it is none yet. */
+    snprintf(partial, sizeof partial, "%s.partial", path);
+    assert_int_equal(rename(path, partial), 0);
+    bench_kill(&b);
+    bench_engine(&b);
+    assert_int_equal(lumi_engine_retake(b.engine, b.now, NULL, NULL, &error), LUMI_ERR_NOTFOUND);
+    assert_non_null(strstr(error.text, "--capture NAME"));
+    bench_end(&b);
+}
+
+static void a_lamp_is_on_while_the_rig_may_move(void **state)
+{
+    struct lumi_error error = {0};
+    struct bench b;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    start(&b);
+    assert_false(b.lit);
+    assert_true(bench_until(&b, LUMI_ENGINE_HOMING, 100));
+    assert_true(b.lit);
+    assert_true(bench_until(&b, LUMI_ENGINE_ARMING, 100));
+    assert_false(b.lit);
+    assert_true(bench_until(&b, LUMI_ENGINE_SWEEPING, 100));
+    assert_int_equal(lumi_engine_pause(b.engine, b.now, &error), LUMI_OK);
+    assert_int_equal(bench_status(&b)->state, LUMI_ENGINE_PAUSING);
+    assert_true(b.lit);
+    assert_true(bench_until(&b, LUMI_ENGINE_DONE, 200));
+    assert_false(b.lit);
     bench_end(&b);
 }
 
@@ -520,6 +549,7 @@ int main(void)
         cmocka_unit_test(what_is_no_plan_is_refused_without_a_board),
         cmocka_unit_test(a_mistyped_override_is_named),
         cmocka_unit_test(a_retake_needs_no_name),
+        cmocka_unit_test(a_lamp_is_on_while_the_rig_may_move),
         cmocka_unit_test(the_rig_is_homed_beside_a_capture),
         cmocka_unit_test(an_arm_on_a_string_is_homed_by_who_knows_its_turn),
         cmocka_unit_test(a_drive_is_asked_before_it_is_believed_in),
