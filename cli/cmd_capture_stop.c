@@ -7,7 +7,8 @@ static gboolean json, at_once, keep_open, emergency;
 
 static const GOptionEntry options[] = {
     {"now", 0, 0, G_OPTION_ARG_NONE, &at_once, "slow down at once, not at the next position", NULL},
-    {"keep-open", 0, 0, G_OPTION_ARG_NONE, &keep_open, "leave the capture open: 'lumi capture resume' goes on", NULL},
+    {"keep-open", 0, 0, G_OPTION_ARG_NONE, &keep_open,
+     "leave the capture open: 'lumi capture retake' takes what is missing", NULL},
     {"emergency", 0, 0, G_OPTION_ARG_NONE, &emergency, "an emergency stop: motor off, by every way there is", NULL},
     CLI_LUMID_OPTIONS,
     CLI_CAPTURE_JSON_OPTION(json),
