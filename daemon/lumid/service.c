@@ -304,7 +304,12 @@ static int64_t http_now(void *context)
 
 static bool http_emergency_stop(void *context)
 {
-    return lumi_service_stop_at_once(context);
+    struct lumi_service *service = context;
+    struct lumi_rig_link_snapshot snapshot;
+    bool sent = lumi_service_stop_at_once(service);
+
+    lumi_rig_link_snapshot(service->link, &snapshot); /* an open port with nobody behind it is no board */
+    return sent && snapshot.state == LUMI_RIG_LINK_OPEN;
 }
 
 static int http_devices(void *context, struct lumi_camera_identity *cameras, int max, struct lumi_error *error)
