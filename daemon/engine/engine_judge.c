@@ -239,7 +239,8 @@ static bool is_accepted(struct lumi_engine *e, const struct engine_judging *job,
         limits.blur_pixels = INFINITY;
         accepted = lumi_judge_verdict(numbers, &limits, usual, reason, size);
         if (accepted)
-            snprintf(reason, size, "as smeared as the time before, over %.1f pixels: the place looks so",
+            snprintf(reason, size,
+                     "as smeared as the time before, over %.1f pixels: the place looks so, or the sweep is too fast",
                      numbers->blur_pixels);
     }
     frame->smear = (float)numbers->blur_pixels;

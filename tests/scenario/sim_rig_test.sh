@@ -1,5 +1,5 @@
 #!/bin/sh
-# A simulated rig as processes, the daemon on it with its judge as it is by default, a small continuous capture with
+# A simulated rig as processes, the daemon on it with its judge as it is by default but for smears, a small continuous capture with
 # motion blur and noise. The result is held against the same views taken at true poses, without blur and noise, and with
 # both: it may lack of the first what the second lacks.
 # usage: sim_rig_test.sh LUMI LUMID
