@@ -56,9 +56,13 @@ char *lumi_api_problem_message(unsigned status, const char *word, const char *de
 
 /* ---- what is asked for (api_calls.c, api_lists.c) ---- */
 
+/* The least who may. */
+enum lumi_api_role { LUMI_API_ANYBODY = 0, LUMI_API_WATCH, LUMI_API_OPERATE };
 struct lumi_api_route {
-    const char *path, *method;
-    const struct lumi_api_field *fields; /* of the body; NULL: none is read */
+    const char *path; /* may hold one {name}: lumi_api_path_match */
+    const char *method;
+    enum lumi_api_role role;
+    const struct lumi_api_field *fields; /* of a POST's body, of a GET's query; NULL: none is read */
     /* In the engine's thread; its answer is sent if there is nothing else. NULL: the engine is not asked. */
     void (*call)(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
     /* In the server's thread, after it. */
@@ -68,6 +72,14 @@ extern const struct lumi_api_route lumi_api_routes[]; /* path NULL ends it */
 
 void lumi_api_serve_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 void lumi_api_serve_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+
+/* ---- the page (api_page.c) ---- */
+
+/* Headers that every answer has: what a browser may do with it. */
+void lumi_api_harden(SoupServerMessage *message);
+void lumi_api_serve_page(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+/* Name of each file of the page: "index.html"; NULL ends them. */
+const char *const *lumi_api_page_files(void);
 
 /* ---- events (api_events.c) ---- */
 

@@ -6,6 +6,7 @@
 #include <gio/gio.h>
 #include <inttypes.h>
 #include <json-glib/json-glib.h>
+#include <math.h>
 #include <string.h>
 
 /* What came from outside, as it may stand in a message: one line of some length. */
@@ -115,6 +116,39 @@ bool lumi_api_event_id_parse(const char *text, uint32_t *epoch, uint64_t *number
     return !*end;
 }
 
+/* ---- paths ---- */
+
+static bool is_name(const char *text)
+{
+    size_t size = strlen(text);
+
+    if (!size || size > LUMI_API_STRING_MAX || text[0] == '.' || !g_utf8_validate(text, -1, NULL))
+        return false;
+    for (size_t i = 0; i < size; i++)
+        if (text[i] == '/' || g_ascii_iscntrl(text[i]))
+            return false;
+    return true;
+}
+
+bool lumi_api_path_match(const char *pattern, const char *path, char part[LUMI_API_STRING_MAX + 1])
+{
+    const char *open = strchr(pattern, '{'), *close = open ? strchr(open, '}') : NULL;
+    size_t before = open ? (size_t)(open - pattern) : 0, size = strlen(path);
+
+    part[0] = '\0';
+    if (!close)
+        return !strcmp(pattern, path);
+    size_t after = strlen(close + 1);
+    if (size <= before + after || strncmp(pattern, path, before) || strcmp(path + size - after, close + 1) ||
+        memchr(path + before, '/', size - before - after))
+        return false;
+    g_autofree char *name = g_uri_unescape_segment(path + before, path + size - after, NULL);
+    if (!name || !is_name(name))
+        return false;
+    g_strlcpy(part, name, LUMI_API_STRING_MAX + 1);
+    return true;
+}
+
 /* ---- bodies ---- */
 
 static int take_strings(JsonNode *node, const struct lumi_api_field *field, struct lumi_api_value *value,
@@ -139,6 +173,35 @@ static int take_strings(JsonNode *node, const struct lumi_api_field *field, stru
     return LUMI_OK;
 }
 
+static int take_int(int64_t number, const struct lumi_api_field *field, struct lumi_api_value *value,
+                    struct lumi_error *error)
+{
+    if (number < 0 || (uint64_t)number > field->max)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': a whole number from 0 to %zu wanted", field->name, field->max);
+    value->number = (int)number;
+    return LUMI_OK;
+}
+
+static int take_real(double number, const struct lumi_api_field *field, struct lumi_api_value *value,
+                     struct lumi_error *error)
+{
+    if (!(number >= field->least && number <= field->most)) /* a NaN is neither */
+        return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': a number from %g to %g wanted", field->name, field->least,
+                         field->most);
+    value->real = number;
+    return LUMI_OK;
+}
+
+static int take_string(const char *text, const struct lumi_api_field *field, struct lumi_api_value *value,
+                       struct lumi_error *error)
+{
+    if (strlen(text) > field->max)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': %zu bytes, %zu are the most", field->name, strlen(text),
+                         field->max);
+    value->string = g_strdup(text);
+    return LUMI_OK;
+}
+
 static int take_value(JsonNode *node, const struct lumi_api_field *field, struct lumi_api_value *value,
                       struct lumi_error *error)
 {
@@ -153,21 +216,38 @@ static int take_value(JsonNode *node, const struct lumi_api_field *field, struct
         value->boolean = json_node_get_boolean(node);
         return LUMI_OK;
     }
-    if (field->type == LUMI_API_INT) {
-        int64_t number = type == G_TYPE_INT64 ? json_node_get_int(node) : -1;
-        if (number < 0 || (uint64_t)number > field->max)
-            return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': a whole number from 0 to %zu wanted", field->name,
-                             field->max);
-        value->number = (int)number;
-        return LUMI_OK;
-    }
+    if (field->type == LUMI_API_INT)
+        return take_int(type == G_TYPE_INT64 ? json_node_get_int(node) : -1, field, value, error);
+    if (field->type == LUMI_API_NUMBER)
+        return take_real(type == G_TYPE_INT64 || type == G_TYPE_DOUBLE ? json_node_get_double(node) : NAN, field, value,
+                         error);
     if (type != G_TYPE_STRING)
         return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': a string wanted", field->name);
-    if (strlen(json_node_get_string(node)) > field->max)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': %zu bytes, %zu are the most", field->name,
-                         strlen(json_node_get_string(node)), field->max);
-    value->string = json_node_dup_string(node);
+    return take_string(json_node_get_string(node), field, value, error);
+}
+
+static int find_field(const struct lumi_api_field *fields, const char *name, int *at, struct lumi_error *error)
+{
+    for (*at = 0; fields[*at].name; ++*at)
+        if (!strcmp(fields[*at].name, name))
+            return LUMI_OK;
+    g_autofree char *shown = quoted(name);
+    return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': there is no such field", shown);
+}
+
+static int find_missing(const struct lumi_api_field *fields, const struct lumi_api_body *body, struct lumi_error *error)
+{
+    for (int i = 0; fields[i].name; i++)
+        if (fields[i].required && !body->values[i].given)
+            return lumi_fail(error, LUMI_ERR_FORMAT, "'%s' is missing", fields[i].name);
     return LUMI_OK;
+}
+
+static void begin_body(struct lumi_api_body *body, const struct lumi_api_field *fields)
+{
+    memset(body->values, 0, sizeof body->values);
+    for (int i = 0; fields[i].name; i++)
+        body->values[i].boolean = fields[i].initially;
 }
 
 static int take_members(JsonObject *object, const struct lumi_api_field *fields, struct lumi_api_body *body,
@@ -179,20 +259,12 @@ static int take_members(JsonObject *object, const struct lumi_api_field *fields,
 
     json_object_iter_init(&iter, object);
     while (json_object_iter_next(&iter, &name, &node)) {
-        int at = 0;
-        while (fields[at].name && strcmp(fields[at].name, name))
-            at++;
-        if (!fields[at].name) {
-            g_autofree char *shown = quoted(name);
-            return lumi_fail(error, LUMI_ERR_FORMAT, "'%s': there is no such field", shown);
-        }
+        int at;
+        LUMI_TRY(find_field(fields, name, &at, error));
         if (!JSON_NODE_HOLDS_NULL(node)) /* as if it were not there */
             LUMI_TRY(take_value(node, &fields[at], &body->values[at], error));
     }
-    for (int i = 0; fields[i].name; i++)
-        if (fields[i].required && !body->values[i].given)
-            return lumi_fail(error, LUMI_ERR_FORMAT, "'%s' is missing", fields[i].name);
-    return LUMI_OK;
+    return find_missing(fields, body, error);
 }
 
 int lumi_api_body_parse(const char *text, size_t size, const struct lumi_api_field *fields, struct lumi_api_body *body,
@@ -202,9 +274,7 @@ int lumi_api_body_parse(const char *text, size_t size, const struct lumi_api_fie
     const char *fault;
     JsonNode *root;
 
-    memset(body, 0, sizeof *body);
-    for (int i = 0; fields[i].name; i++)
-        body->values[i].boolean = fields[i].initially;
+    begin_body(body, fields);
     if (!size) {
         text = "{}";
         size = 2;
@@ -218,6 +288,52 @@ int lumi_api_body_parse(const char *text, size_t size, const struct lumi_api_fie
     if (!root || !JSON_NODE_HOLDS_OBJECT(root))
         return lumi_fail(error, LUMI_ERR_FORMAT, "the body is JSON, but no object");
     return take_members(json_node_get_object(root), fields, body, error);
+}
+
+static int take_word(const char *text, const struct lumi_api_field *field, struct lumi_api_value *value,
+                     struct lumi_error *error)
+{
+    char *end;
+
+    if (value->given)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "'%s' comes twice", field->name);
+    value->given = true;
+    if (field->type == LUMI_API_BOOL) {
+        value->boolean = !strcmp(text, "true");
+        return value->boolean || !strcmp(text, "false")
+                   ? LUMI_OK
+                   : lumi_fail(error, LUMI_ERR_FORMAT, "'%s': true or false wanted", field->name);
+    }
+    if (field->type == LUMI_API_INT) {
+        gint64 number = g_ascii_strtoll(text, &end, 10);
+        return take_int(g_ascii_isdigit(text[0]) && !*end ? number : -1, field, value, error);
+    }
+    if (field->type == LUMI_API_NUMBER) {
+        double number = g_ascii_strtod(text, &end);
+        return take_real(*text && !*end ? number : NAN, field, value, error);
+    }
+    return take_string(text, field, value, error);
+}
+
+int lumi_api_query_parse(const char *query, const struct lumi_api_field *fields, struct lumi_api_body *body,
+                         struct lumi_error *error)
+{
+    g_auto(GStrv) pairs = g_strsplit(query ? query : "", "&", -1);
+
+    begin_body(body, fields);
+    for (int i = 0; pairs[i]; i++) {
+        char *equals = strchr(pairs[i], '=');
+        g_autofree char *name = g_uri_unescape_segment(pairs[i], equals, NULL);
+        g_autofree char *text = g_uri_unescape_string(equals ? equals + 1 : "", NULL);
+        int at;
+        if (!*pairs[i])
+            continue;
+        if (!name || !text || !g_utf8_validate(name, -1, NULL) || !g_utf8_validate(text, -1, NULL))
+            return lumi_fail(error, LUMI_ERR_ARG, "the query is not encoded as one");
+        LUMI_TRY(find_field(fields, name, &at, error));
+        LUMI_TRY(take_word(text, &fields[at], &body->values[at], error));
+    }
+    return find_missing(fields, body, error);
 }
 
 void lumi_api_body_clear(struct lumi_api_body *body)

@@ -94,8 +94,9 @@ static void answer_no_method(SoupServerMessage *message, const char *path)
 {
     g_autoptr(GString) allowed = g_string_new(NULL);
 
+    char part[LUMI_API_STRING_MAX + 1];
     for (int i = 0; lumi_api_routes[i].path; i++)
-        if (!strcmp(lumi_api_routes[i].path, path))
+        if (lumi_api_path_match(lumi_api_routes[i].path, path, part))
             g_string_append_printf(allowed, "%s%s", allowed->len ? ", " : "", lumi_api_routes[i].method);
     g_autofree char *detail = g_strdup_printf("here: %s", allowed->str);
     soup_message_headers_replace(soup_server_message_get_response_headers(message), "Allow", allowed->str);
@@ -181,7 +182,11 @@ static int read_body(SoupServerMessage *message, const struct lumi_api_route *ro
     const char *text = g_bytes_get_data(bytes, &size);
     int code = LUMI_ERR_ARG;
 
-    if (size && g_strcmp0(type, "application/json"))
+    if (!strcmp(route->method, "GET")) {
+        const char *query = g_uri_get_query(soup_server_message_get_uri(message));
+        if ((code = lumi_api_query_parse(query, route->fields, body, &error)) != LUMI_OK)
+            lumi_api_problem_of(answer, code, error.text);
+    } else if (size && g_strcmp0(type, "application/json"))
         lumi_api_problem(answer, 415, "type", "a body must be JSON (Content-Type: application/json)");
     else if ((code = lumi_api_body_parse(text, size, route->fields, body, &error)) != LUMI_OK)
         lumi_api_problem_of(answer, code, error.text);
@@ -189,11 +194,13 @@ static int read_body(SoupServerMessage *message, const struct lumi_api_route *ro
     return code;
 }
 
-static void call(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_route *route)
+static void call(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_route *route,
+                 const char *part)
 {
     struct lumi_api_body body = {0};
     struct lumi_api_answer answer = {0};
 
+    g_strlcpy(body.part, part, sizeof body.part);
     if (route->fields && read_body(message, route, &body, &answer) != LUMI_OK)
         lumi_api_send(message, &answer);
     else if (route->call)
@@ -208,18 +215,20 @@ static void on_request(SoupServer *server, SoupServerMessage *message, const cha
 {
     struct lumi_http *http = context;
     const char *method = soup_server_message_get_method(message);
+    char part[LUMI_API_STRING_MAX + 1];
     bool known = false;
 
     (void)server;
     (void)query;
+    lumi_api_harden(message);
     if (refused(http, message))
         return;
     for (int i = 0; lumi_api_routes[i].path; i++) {
-        if (strcmp(lumi_api_routes[i].path, path))
+        if (!lumi_api_path_match(lumi_api_routes[i].path, path, part))
             continue;
         known = true;
         if (!strcmp(lumi_api_routes[i].method, method)) {
-            call(http, message, &lumi_api_routes[i]);
+            call(http, message, &lumi_api_routes[i], part);
             return;
         }
     }
