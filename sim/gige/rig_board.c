@@ -8,10 +8,12 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
-#define CLOCK_NS UINT64_C(20000000) /* the shared clock is told this often */
-#define FIRED 8                     /* exposures by software that are under way, of a camera */
+#define CLOCK_NS UINT64_C(20000000)    /* the shared clock is told this often */
+#define FIRED 8                        /* exposures by software that are under way, of a camera */
+#define REST_TICKS (BOARD_TICK_HZ / 4) /* without a step: the motor is at rest */
 
 /* One that no line has triggered. */
 struct fired {
@@ -27,6 +29,8 @@ struct board_process {
     bool unplugged[LUMI_RIG_CAMERAS];
     struct rig_message drive_told;
     struct fired fired[LUMI_RIG_CAMERAS][FIRED];
+    int steps_told; /* up to here they are in steps.txt */
+    FILE *steps;
     volatile sig_atomic_t stop;
 };
 
@@ -145,6 +149,25 @@ static void tell_drive(struct board_process *b, struct sim_machine *machine)
     (void)!send(b->setup->drive, &now, sizeof now, MSG_NOSIGNAL);
 }
 
+/* Each time the motor has come to rest: when its last step was, by the clock, and how many there were. So that an
+ * emergency stop can be timed by what the motor did. */
+static void tell_steps(struct board_process *b, struct sim_machine *machine)
+{
+    const uint64_t now = sim_machine_now(machine);
+    struct timespec clock;
+    const uint64_t *ticks;
+    int count;
+
+    ticks = sim_machine_step_ticks(machine, &count);
+    if (count <= b->steps_told || now - ticks[count - 1] < REST_TICKS)
+        return;
+    clock_gettime(CLOCK_REALTIME, &clock);
+    const double since = (double)(now - ticks[count - 1]) / BOARD_TICK_HZ / b->setup->rig->speed;
+    fprintf(b->steps, "%.4f %d\n", (double)clock.tv_sec + clock.tv_nsec * 1e-9 - since, count);
+    fflush(b->steps);
+    b->steps_told = count;
+}
+
 static void hear_drive(struct board_process *b, struct sim_machine *machine)
 {
     struct rig_message message;
@@ -190,6 +213,7 @@ static void turn(void *context, struct sim_machine *machine)
             hear(b, machine, &message);
     hear_drive(b, machine);
     tell_drive(b, machine);
+    tell_steps(b, machine);
     tell_clock(b, machine);
     tell_plugs(b, machine);
     tell_exposures(b, machine);
@@ -211,7 +235,8 @@ int rig_board_run(const struct rig_board *setup, struct lumi_error *error)
 {
     static struct board_process board;
     struct sim_serve_options options;
-    char link[600];
+    char link[600], steps[600];
+    int code;
 
     board.setup = setup;
     sim_serve_options_init(&options, &setup->rig->rig);
@@ -225,5 +250,11 @@ int rig_board_run(const struct rig_board *setup, struct lumi_error *error)
     options.turn = turn;
     options.turn_fd = setup->eye_count > 0 ? setup->eyes[0] : -1;
     options.context = &board;
-    return sim_serve(&setup->rig->rig, &options, error);
+    snprintf(steps, sizeof steps, "%s/steps.txt", setup->rig->folder);
+    board.steps = fopen(steps, "w");
+    if (!board.steps)
+        return lumi_fail_errno(error, steps, "making it");
+    code = sim_serve(&setup->rig->rig, &options, error);
+    fclose(board.steps);
+    return code;
 }
