@@ -13,7 +13,7 @@ set_tests_properties(browser_packages PROPERTIES FIXTURES_SETUP browser_packages
 file(GLOB specs CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} *.spec.mjs)
 foreach(spec ${specs})
   string(REPLACE ".spec.mjs" "" name ${spec})
-  add_test(NAME browser_${name} COMMAND node ${CMAKE_CURRENT_SOURCE_DIR}/run.mjs $<TARGET_FILE:lumi>
+  add_test(NAME browser_${name} COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/run.sh $<TARGET_FILE:lumi>
     $<TARGET_FILE:lumid> ${packages} ${PROJECT_BINARY_DIR}/browser/${name} ${CMAKE_CURRENT_SOURCE_DIR}/${spec})
   set_tests_properties(browser_${name} PROPERTIES FIXTURES_REQUIRED browser_packages SKIP_RETURN_CODE 77 TIMEOUT 300
     RUN_SERIAL TRUE LABELS "browser;slow")
