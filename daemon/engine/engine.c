@@ -106,6 +106,8 @@ int64_t engine_unix_us(const struct lumi_engine *e, int64_t host_ns)
 
 void engine_go(struct lumi_engine *e, enum engine_stage stage)
 {
+    if (e->stage == STAGE_REST && stage != STAGE_REST)
+        engine_look_none(e);
     e->stage = stage;
     e->stage_ns = e->now;
     e->stage_at = 0;

@@ -62,12 +62,25 @@ void lumi_engine_config_init(struct lumi_engine_config *config);
 struct lumi_engine_judge_job {
     uint64_t id;
     int camera;
+    int shot; /* −1: a test */
     const struct lumi_camera_frame *frame;
     const struct lumi_lens *lens;
     struct lumi_pose pose;
     double exposure_s, gain;
     struct lumi_judge_neighbour neighbours[4];
     int neighbour_count;
+};
+
+/* A frame that has come, for who shows pictures. */
+struct lumi_engine_picture {
+    int camera;
+    struct lumi_camera_frame *frame; /* the engine's: who wants to keep it holds it (lumi_camera_frame_ref), not long */
+    const char *name;                /* of the frame in the capture; "": of none */
+    int shot;                        /* −1: a test, a look */
+    int64_t unix_us;                 /* of the exposure, as far as that is known */
+    double white[2];                 /* raw: as configured; 0: as the frame says */
+    bool spare; /* the store's queue is less than half full, nobody waits for the judges, and half of the camera's
+                   buffers are free */
 };
 
 enum lumi_engine_state {
@@ -127,8 +140,9 @@ struct lumi_engine_ports {
     void (*drive_check)(void *context, uint32_t number);
     /* Answered by a notice of LUMI_CAMERA_DONE. */
     void (*camera_command)(void *context, int camera, uint32_t number, const struct lumi_camera_command *command);
-    void (*lamp)(void *context, bool on);                                  /* NULL: there is no line for it */
-    void (*judge)(void *context, const struct lumi_engine_judge_job *job); /* answered by lumi_engine_judged */
+    void (*lamp)(void *context, bool on);                                      /* NULL: there is no line for it */
+    void (*judge)(void *context, const struct lumi_engine_judge_job *job);     /* answered by lumi_engine_judged */
+    void (*picture)(void *context, const struct lumi_engine_picture *picture); /* NULL: nobody shows any */
     void (*hand_over)(void *context, const char *capture);
     void (*told)(void *context, const struct lumi_engine_told *told);
 };
@@ -194,6 +208,15 @@ int lumi_engine_home(struct lumi_engine *engine, int64_t now_ns, int turn, bool 
 /* Opens a capture that a crash left in config.folder, if there is one; *found. It goes on by itself when board and
  * cameras are there, unless it was paused. */
 int lumi_engine_recover(struct lumi_engine *engine, int64_t now_ns, bool *found, struct lumi_error *error);
+
+/* One picture of this camera, now, while nothing is under way: for who stands before it. Asked for again and again, the
+ * engine sees to what has to be done first: a camera that can is set to fire by software, whatever it is in a capture;
+ * one that runs freely is let run; any other is fired by the board's test trigger, once the rig is known. Frames come
+ * by ports.picture. Whatever begins ends it, and cameras are set up anew then; nothing is accounted for. LUMI_ERR_BUSY:
+ * something is under way, or the board cannot now. LUMI_ERR_NOTFOUND: the camera is not there. LUMI_ERR_UNSUPPORTED: it
+ * records by itself, or the rig is not known yet. */
+int lumi_engine_look(struct lumi_engine *engine, int64_t now_ns, int camera, struct lumi_error *error);
+void lumi_engine_look_end(struct lumi_engine *engine, int64_t now_ns, int camera); /* nobody looks any more */
 
 /* ---- what can be seen ---- */
 

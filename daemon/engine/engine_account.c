@@ -56,6 +56,7 @@ void engine_held_drop(struct engine_held *held)
     if (!held || --held->users > 0)
         return;
     lumi_camera_frame_release(held->frame);
+    --*held->of;
     lumi_free(held);
 }
 

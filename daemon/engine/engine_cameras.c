@@ -24,6 +24,8 @@ void engine_camera_do(struct lumi_engine *e, int camera, enum lumi_camera_comman
     struct engine_camera *c = e->cameras + camera;
     struct lumi_camera_command command = {.kind = kind, .setting = e->config.cameras[camera].setting};
 
+    if (c->looking && command.setting.trigger != LUMI_TRIGGER_FREE && c->identity.software_trigger)
+        command.setting.trigger = LUMI_TRIGGER_SOFTWARE;
     if (command.setting.exposure_s <= 0 && c->identity.exposure_control)
         command.setting.exposure_s = exposure_s;
     command.exposure_s = exposure_s;
@@ -114,6 +116,7 @@ static void done(struct lumi_engine *e, int camera, const struct lumi_camera_not
         if (c->command_kind == LUMI_CAMERA_EXPOSE && engine_taking(e))
             engine_incident(e, camera, "exposure", "camera %s did not take its exposure time: %s",
                             e->config.cameras[camera].name, notice->text);
+        engine_look_done(e, camera);
         return;
     }
     if (c->command_kind == LUMI_CAMERA_CONFIGURE)
@@ -122,6 +125,7 @@ static void done(struct lumi_engine *e, int camera, const struct lumi_camera_not
         c->armed = true;
     if (c->command_kind == LUMI_CAMERA_DISARM)
         c->armed = false;
+    engine_look_done(e, camera);
 }
 
 void lumi_engine_camera_notice(struct lumi_engine *e, int64_t now_ns, int camera,

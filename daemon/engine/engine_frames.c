@@ -45,6 +45,8 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
     if (e->config.cameras[camera].black > 0)
         frame->black = e->config.cameras[camera].black;
     if (!engine_taking(e) || !c->used || !c->match) {
+        if (c->looking)
+            engine_picture(e, -1, camera, frame);
         lumi_camera_frame_release(frame);
         return;
     }
@@ -54,7 +56,8 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
         lumi_camera_frame_release(frame);
         return;
     }
-    *held = (struct engine_held){.frame = frame, .users = 1, .bytes = frame->size};
+    *held = (struct engine_held){.frame = frame, .users = 1, .bytes = frame->size, .of = &c->held};
+    c->held++;
     if (c->identity.records_itself || frame->format.layout == LUMI_LAYOUT_FILE) {
         keep_file(e, camera, held);
         return;
@@ -142,6 +145,7 @@ static void store_frame(struct lumi_engine *e, int shot, int camera, struct engi
         }
         return;
     }
+    engine_picture(e, shot, camera, held->frame);
     flight->shot = shot;
     flight->camera = camera;
     flight->held = held;

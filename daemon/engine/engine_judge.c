@@ -67,6 +67,7 @@ static void ask(struct lumi_engine *e, struct engine_judging *job, const struct 
 {
     struct lumi_engine_judge_job asked = {.id = job->id,
                                           .camera = job->camera,
+                                          .shot = job->shot,
                                           .frame = frame,
                                           .lens = lens_of(e, job->camera),
                                           .exposure_s = job->exposure_s,

@@ -7,6 +7,7 @@
  *   engine_take.c       home, arm, load, mark, start    engine_sweep.c     the sweep goes on; what interrupts it
  *   engine_end.c        drain, retakes, seal            engine_open.c      making and opening captures, recovering
  *   engine_status.c     what can be seen                engine_control.c   what an operator wants
+ *   engine_look.c       frames for who shows pictures, and pictures while nothing is under way
  *
  * A capture goes through stages, one at a time; each stage's function is asked again whenever something has happened,
  * until it goes on to another stage.
@@ -95,6 +96,7 @@ struct engine_held {
     struct lumi_camera_frame *frame;
     int users;
     size_t bytes;
+    int *of; /* counts those of a camera */
 };
 
 /* What a frame's file is made of, in a writer's thread. */
@@ -161,6 +163,9 @@ struct engine_camera {
     bool edge_seen;  /* of its sync line, in the test */
     size_t frame_bytes;
     struct engine_held *test;
+    int held;        /* its frames that are in memory here */
+    bool looking;    /* it is set up for pictures while nothing is under way */
+    int64_t look_ns; /* not before this the next */
     struct engine_picture *pictures[ENGINE_PICTURES];
     struct lumi_judge_usual usual;
     uint32_t unseen, wrong_exposure; /* told of: the first few by name, then counted */
@@ -200,6 +205,7 @@ struct lumi_engine {
     uint32_t next_number;
     struct engine_ask ask;
     uint32_t side; /* of a request whose answer matters only if it fails */
+    uint32_t look; /* of a test trigger for a picture; 0: none is out */
     int64_t cleared_ns;
     struct lumi_rig rig;
     bool rig_known;
@@ -356,6 +362,13 @@ void engine_judge(struct lumi_engine *e, int shot, int camera, struct engine_hel
 void engine_judge_due(struct lumi_engine *e);
 void engine_judge_forget(struct lumi_engine *e); /* verdicts that are still to come are of no account */
 void engine_judge_reset(struct lumi_engine *e);
+
+/* ---- engine_look.c ---- */
+void engine_picture(struct lumi_engine *e, int shot, int camera, struct lumi_camera_frame *frame);
+void engine_look_none(struct lumi_engine *e); /* something begins */
+/* What came of a command to a camera that is looked through; of a test trigger. */
+void engine_look_done(struct lumi_engine *e, int camera);
+void engine_look_reply(struct lumi_engine *e, uint32_t number);
 
 /* ---- the stages ---- */
 typedef bool (*engine_stage_fn)(struct lumi_engine *e); /* true: another stage */

@@ -51,6 +51,7 @@ void lumi_engine_rig_reply(struct lumi_engine *e, int64_t now_ns, uint32_t numbe
         e->side = 0;
         side_failed(e, code, text);
     }
+    engine_look_reply(e, number);
     if (number && number == e->ask.number && !e->ask.answered) {
         e->ask.answered = true;
         e->ask.code = code;

@@ -95,11 +95,14 @@ void engine_test_frame(struct lumi_engine *e, int camera, struct lumi_camera_fra
     e->cameras[e->test_camera].round_seen |= camera == e->test_camera;
     if (camera == e->test_camera && c->match && !c->identity.records_itself)
         note_answer(e, camera, frame);
+    if (camera == e->test_camera)
+        engine_picture(e, -1, camera, frame);
     if (camera != e->test_camera || c->test || !(held = lumi_calloc(1, sizeof *held))) {
         lumi_camera_frame_release(frame);
         return;
     }
-    *held = (struct engine_held){.frame = frame, .users = 1, .bytes = frame->size};
+    *held = (struct engine_held){.frame = frame, .users = 1, .bytes = frame->size, .of = &c->held};
+    c->held++;
     c->test = held;
     c->frame_bytes = frame->size;
 }
@@ -235,6 +238,7 @@ static void judge_tests(struct lumi_engine *e)
         *job = (struct engine_judging){.used = true, .id = ++e->judge_serial, .shot = -1, .camera = c, .held = held};
         struct lumi_engine_judge_job asked = {.id = job->id,
                                               .camera = c,
+                                              .shot = -1,
                                               .frame = held->frame,
                                               .lens = &e->rig.lenses[e->rig.cameras[e->cameras[c].rig].lens].lens,
                                               .exposure_s = e->plan.exposures[0],

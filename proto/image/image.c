@@ -105,7 +105,7 @@ static int to_rgb(const struct image_source *source, struct lumi_raster *raster)
 int lumi_image_read_memory(const void *data, size_t size, const char *name, int channels, struct lumi_raster *raster,
                            struct lumi_image_meta *meta, struct lumi_error *error)
 {
-    struct image_source source = {data, size, size, name, error};
+    struct image_source source = {data, size, size, name, error, 0};
     struct lumi_image_meta own = {0};
 
     *raster = (struct lumi_raster){0};
@@ -122,6 +122,22 @@ int lumi_image_read_memory(const void *data, size_t size, const char *name, int 
         *meta = own;
     else
         lumi_image_meta_finish(&own);
+    return code;
+}
+
+int lumi_image_read_reduced(const void *data, size_t size, const char *name, int most, struct lumi_raster *raster,
+                            struct lumi_image_info *info, struct lumi_error *error)
+{
+    struct image_source source = {data, size, size, name, error, most};
+    struct lumi_image_meta meta = {0};
+
+    *raster = (struct lumi_raster){0};
+    int code = read_source(&source, raster, &meta);
+    if (code != LUMI_OK)
+        lumi_raster_finish(raster);
+    if (info)
+        *info = code == LUMI_OK ? meta.info : (struct lumi_image_info){0};
+    lumi_image_meta_finish(&meta);
     return code;
 }
 
@@ -147,7 +163,7 @@ int lumi_image_read_channel(const char *path, const char *channel, struct lumi_r
 
     *raster = (struct lumi_raster){0};
     LUMI_TRY(lumi_file_read(path, MAX_FILE, &data, &size, error));
-    struct image_source source = {data, size, size, path, error};
+    struct image_source source = {data, size, size, path, error, 0};
     int code = image_exr.probe(data, size) ? image_exr_channel(&source, channel, raster)
                                            : lumi_fail(error, LUMI_ERR_FORMAT, "%s: not an OpenEXR image", path);
     if (code != LUMI_OK)
@@ -159,7 +175,7 @@ int lumi_image_read_channel(const char *path, const char *channel, struct lumi_r
 int lumi_image_info_memory(const void *data, size_t size, const char *name, struct lumi_image_info *info,
                            struct lumi_error *error)
 {
-    struct image_source source = {data, size, size, name, error};
+    struct image_source source = {data, size, size, name, error, 0};
     struct lumi_image_meta meta = {0};
     int code = read_source(&source, NULL, &meta);
 
@@ -180,7 +196,7 @@ static bool meta_from_beginning(const char *path, struct lumi_image_meta *meta)
     uint8_t *data = lumi_alloc(HEADER_BYTES, 1);
     if (data && !fstat(fd, &status) && S_ISREG(status.st_mode)) {
         ssize_t got = read(fd, data, HEADER_BYTES);
-        struct image_source source = {data, got > 0 ? (size_t)got : 0, (uint64_t)status.st_size, path, NULL};
+        struct image_source source = {data, got > 0 ? (size_t)got : 0, (uint64_t)status.st_size, path, NULL, 0};
         done = got > 0 && !image_tiff.probe(data, source.size) && !image_raw.probe(data, source.size) &&
                read_source(&source, NULL, meta) == LUMI_OK;
         if (!done)
@@ -200,7 +216,7 @@ int lumi_image_read_meta(const char *path, struct lumi_image_meta *meta, struct 
     if (meta_from_beginning(path, meta))
         return LUMI_OK;
     LUMI_TRY(lumi_file_read(path, MAX_FILE, &data, &size, error));
-    struct image_source source = {data, size, size, path, error};
+    struct image_source source = {data, size, size, path, error, 0};
     int code = read_source(&source, NULL, meta);
     if (code != LUMI_OK)
         lumi_image_meta_finish(meta);

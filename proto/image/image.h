@@ -70,6 +70,12 @@ int lumi_image_read(const char *path, int channels, struct lumi_raster *raster, 
 int lumi_image_read_memory(const void *data, size_t size, const char *name, int channels, struct lumi_raster *raster,
                            struct lumi_image_meta *meta, struct lumi_error *error);
 
+/* The same from memory for a picture to look at, as small as is wanted where that saves work: a JPEG is decoded at an
+ * eighth of its size, two eighths …, the most that is not wider than `most`, an eighth at least; other formats are read
+ * whole. `info`: the whole image; may be NULL. */
+int lumi_image_read_reduced(const void *data, size_t size, const char *name, int most, struct lumi_raster *raster,
+                            struct lumi_image_info *info, struct lumi_error *error);
+
 /* The header alone: fast, no pixels are decoded. */
 int lumi_image_info(const char *path, struct lumi_image_info *info, struct lumi_error *error);
 int lumi_image_info_memory(const void *data, size_t size, const char *name, struct lumi_image_info *info,

@@ -102,6 +102,25 @@ static int take_exif(struct read_job *read)
     return LUMI_OK;
 }
 
+/* As small as it is wanted: libjpeg leaves out what such a picture does not show. */
+static int claim_rows(struct read_job *read)
+{
+    struct jpeg_decompress_struct *cinfo = &read->cinfo;
+    struct lumi_image_info info = read->meta->info;
+    const int most = read->source->most;
+
+    if (most > 0 && info.width > most) {
+        cinfo->scale_num = 1;
+        cinfo->scale_denom = 8;
+        while (cinfo->scale_num < 7 && ((int64_t)info.width * (cinfo->scale_num + 1) + 7) / 8 <= most)
+            cinfo->scale_num++;
+        jpeg_calc_output_dimensions(cinfo);
+        info.width = (int)cinfo->output_width;
+        info.height = (int)cinfo->output_height;
+    }
+    return image_claim(read->source, &info, read->raster);
+}
+
 static int read_guarded(struct read_job *read)
 {
     struct jpeg_decompress_struct *cinfo = &read->cinfo;
@@ -122,7 +141,7 @@ static int read_guarded(struct read_job *read)
                             &read->meta->info));
     if (!read->raster)
         return LUMI_OK;
-    LUMI_TRY(image_claim(read->source, &read->meta->info, read->raster));
+    LUMI_TRY(claim_rows(read));
     cinfo->out_color_space = cinfo->num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
     cinfo->dct_method = JDCT_ISLOW;
     jpeg_start_decompress(cinfo);

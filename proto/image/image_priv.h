@@ -12,6 +12,7 @@ struct image_source {
     uint64_t file_size; /* bytes there are in all */
     const char *name;
     struct lumi_error *error;
+    int most; /* pixels in a row that are wanted; 0: all there are */
 };
 
 struct image_codec {
