@@ -3,7 +3,8 @@
  * told how many it missed ("gap"), and hung up on when it takes nothing for a minute.
  *
  * An event's id is "EPOCH-NUMBER". The epoch is another for every start of the program: who comes back with one of an
- * earlier start gets all that is kept. "progress" (a Capture) has no id: only the newest is worth having. */
+ * earlier start gets all that is kept. "progress" (a Capture) has no id: only the newest is worth having; likewise what
+ * lumi_api_events_latest tells, of which the newest is kept for every name. */
 #define _GNU_SOURCE /* POLLRDHUP */
 #include "daemon/http/api_priv.h"
 #include "daemon/http/api_report.h"
@@ -25,10 +26,18 @@ struct event {
     char *data; /* one line of JSON */
 };
 
+/* Of which only the newest is worth having. */
+struct latest {
+    const char *kind;
+    char *name, *data;
+    uint64_t number;
+};
+
 struct listener {
     struct lumi_api_events *events;
     SoupServerMessage *message;
     uint64_t next;      /* number of the event it gets next */
+    uint64_t latest;    /* number of the last of those that it has seen */
     uint64_t progress;  /* the progress it has seen */
     bool busy;          /* a block is on its way */
     int64_t written_ns; /* when the last one was */
@@ -46,6 +55,8 @@ struct lumi_api_events {
     struct event ring[RING];
     uint64_t first, next; /* numbers of the oldest that is kept, of the next there will be */
     GPtrArray *listeners;
+    GArray *latest; /* struct latest, the newest at the end */
+    uint64_t latest_number;
     char *progress;
     uint64_t progress_number;
     bool looking; /* the engine is being asked how far it is */
@@ -265,6 +276,20 @@ static void send_block(struct listener *listener, GString *block)
     soup_server_message_unpause(listener->message);
 }
 
+/* As many as go into a block; what is left has its turn with the next. */
+static void put_latest(struct listener *listener, GString *block)
+{
+    const GArray *all = listener->events->latest;
+
+    for (guint i = 0; i < all->len && block->len < BLOCK_BYTES; i++) {
+        const struct latest *latest = &g_array_index(all, struct latest, i);
+        if (latest->number <= listener->latest)
+            continue;
+        put_event(block, latest->kind, latest->data);
+        listener->latest = latest->number;
+    }
+}
+
 /* The next block for somebody who has taken the last one. */
 static void pump(struct listener *listener)
 {
@@ -287,6 +312,8 @@ static void pump(struct listener *listener)
         put_event(block, "progress", events->progress);
         listener->progress = events->progress_number;
     }
+    if (listener->next == events->next)
+        put_latest(listener, block);
     if (!block->len && events->http->options.now_ns(events->http->options.context) - listener->written_ns > PING_NS)
         g_string_append(block, ": here\n\n");
     if (block->len)
@@ -301,8 +328,31 @@ static void pump_all(struct lumi_api_events *events)
         pump(events->listeners->pdata[i]);
 }
 
+void lumi_api_events_latest(struct lumi_api_events *events, const char *kind, const char *name, char *data)
+{
+    struct latest made = {.kind = kind, .name = g_strdup(name), .data = data, .number = ++events->latest_number};
+
+    for (guint i = 0; i < events->latest->len; i++) {
+        struct latest *latest = &g_array_index(events->latest, struct latest, i);
+        if (strcmp(latest->kind, kind) || strcmp(latest->name, name))
+            continue;
+        g_array_remove_index(events->latest, i);
+        break;
+    }
+    g_array_append_val(events->latest, made);
+    pump_all(events);
+}
+
+static void clear_latest(void *data)
+{
+    struct latest *latest = data;
+
+    g_free(latest->name);
+    g_free(latest->data);
+}
+
 /* The server does not read from who listens, so nobody tells it that the other side has closed. */
-static bool has_hung_up(GSocket *socket)
+bool lumi_api_has_hung_up(GSocket *socket)
 {
     struct pollfd fd = {.fd = g_socket_get_fd(socket), .events = POLLRDHUP};
 
@@ -314,7 +364,7 @@ static void look_after(struct listener *listener, int64_t now)
 {
     GSocket *socket = soup_server_message_get_socket(listener->message);
 
-    if (!socket || (!has_hung_up(socket) && !(listener->busy && now - listener->written_ns > PATIENCE_NS)))
+    if (!socket || (!lumi_api_has_hung_up(socket) && !(listener->busy && now - listener->written_ns > PATIENCE_NS)))
         return;
     g_socket_shutdown(socket, TRUE, TRUE, NULL);
     if (!listener->busy)
@@ -425,6 +475,8 @@ int lumi_api_events_create(struct lumi_http *http, struct lumi_api_events **even
     made->epoch = g_random_int();
     made->first = made->next = 1;
     made->told = g_array_new(FALSE, FALSE, sizeof(struct lumi_engine_told));
+    made->latest = g_array_new(FALSE, FALSE, sizeof(struct latest));
+    g_array_set_clear_func(made->latest, clear_latest);
     made->listeners = g_ptr_array_new_with_free_func(free_listener);
     *events = made;
     return LUMI_OK;
@@ -442,6 +494,7 @@ void lumi_api_events_destroy(struct lumi_api_events *events)
     }
     g_ptr_array_unref(events->listeners);
     g_array_unref(events->told);
+    g_array_unref(events->latest);
     for (int i = 0; i < RING; i++)
         g_free(events->ring[i].data);
     g_free(events->progress);

@@ -13,6 +13,8 @@
 
 struct lumi_api_events;
 struct lumi_api_guard;
+struct lumi_api_live;
+struct lumi_api_pictures;
 struct lumi_http {
     struct lumi_http_options options; /* its strings are copies */
     GMainContext *context;            /* of the server's thread */
@@ -25,6 +27,8 @@ struct lumi_http {
     struct lumi_api_worker *worker;
     struct lumi_api_guard *guard;
     GPtrArray *refusals;
+    struct lumi_api_live *live;
+    struct lumi_api_pictures *pictures;
     /* In both: each has members of its own. */
     struct lumi_api_events *events;
     /* In the engine's. */
@@ -92,6 +96,28 @@ void lumi_api_see_events(struct lumi_http *http, struct lumi_api_answer *answer,
 void lumi_api_events_told(struct lumi_api_events *events, const struct lumi_engine_told *told);
 void lumi_api_events_processing(struct lumi_api_events *events, const struct lumi_process_status *status);
 void lumi_api_events_ingest(struct lumi_api_events *events, const struct lumi_ingest_status *status);
+/* Server's thread: an event without an id, of which the newest of this kind and name is kept, also for who comes later.
+ * Takes over `data`, one line of JSON; `kind` is static. */
+void lumi_api_events_latest(struct lumi_api_events *events, const char *kind, const char *name, char *data);
+/* Nobody tells a server that does not read that the other side has closed. */
+bool lumi_api_has_hung_up(GSocket *socket);
+
+/* ---- pictures (api_pictures.c, api_live.c) ---- */
+
+struct lumi_api_pictures *lumi_api_pictures_create(struct lumi_http *http); /* before the server's thread begins */
+void lumi_api_pictures_silence(struct lumi_api_pictures *pictures);         /* nothing comes from outside any more */
+void lumi_api_pictures_destroy(struct lumi_api_pictures *pictures);
+void lumi_api_get_cameras(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+void lumi_api_serve_last(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_live(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+/* Who watches. A camera has a new picture: it goes to those who have taken the last one. */
+struct lumi_api_live *lumi_api_live_create(struct lumi_http *http);
+void lumi_api_live_destroy(struct lumi_api_live *live);
+void lumi_api_live_picture(struct lumi_api_live *live, int camera);
+/* Adds the members of an object that is open. */
+void lumi_api_picture(JsonBuilder *builder, struct lumi_pictures *pictures, const struct lumi_picture *picture);
+/* (transfer full) The picture's file; the bytes hold the picture. */
+GBytes *lumi_api_picture_bytes(struct lumi_picture *picture);
 
 /* ---- connections (api_guard.c) ---- */
 

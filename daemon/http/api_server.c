@@ -360,6 +360,8 @@ static int make_server(struct lumi_http *made, struct lumi_error *error)
     LUMI_GOTO(code, out, lumi_api_post_create(made->context, &made->to_server, error));
     LUMI_GOTO(code, out, lumi_api_worker_create(made->to_server, &made->worker, error));
     LUMI_GOTO(code, out, lumi_api_events_create(made, &made->events, error));
+    made->live = lumi_api_live_create(made);
+    made->pictures = lumi_api_pictures_create(made);
     made->guard = lumi_api_guard_create(made);
     soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
     soup_server_add_handler(made->server, NULL, on_request, made, NULL);
@@ -393,12 +395,15 @@ void lumi_http_stop(struct lumi_http *http)
 {
     if (!http)
         return;
+    lumi_api_pictures_silence(http->pictures);
     if (http->running)
         end_thread(http);
     g_main_context_push_thread_default(http->context);
     lumi_api_worker_destroy(http->worker);
     lumi_api_post_destroy(http->to_engine);
     lumi_api_post_destroy(http->to_server);
+    lumi_api_live_destroy(http->live);
+    lumi_api_pictures_destroy(http->pictures);
     lumi_api_events_destroy(http->events);
     lumi_api_guard_destroy(http->guard);
     lumi_api_refuse_finish(http);

@@ -8,6 +8,7 @@
 
 #include "daemon/engine/engine.h"
 #include "daemon/handover/handover.h"
+#include "daemon/preview/pictures.h"
 
 struct lumi_http;
 struct lumi_http_options {
@@ -23,6 +24,7 @@ struct lumi_http_options {
     struct lumi_handover *handover;   /* may be NULL */
     bool processes;                   /* the hand-over has a command to start */
     struct lumi_ingest *ingest;       /* may be NULL */
+    struct lumi_pictures *pictures;   /* of the engine's cameras, in their order; may be NULL. Outlives the server */
     int64_t (*now_ns)(void *context); /* in either thread */
     /* Straight to the board, in the server's thread; the engine is told later. False: the board is away, it is stopped
      * when it comes back. Never NULL. */

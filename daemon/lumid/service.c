@@ -338,6 +338,7 @@ static int start_http(struct lumi_service *service, struct lumi_error *error)
     options.now_ns = http_now;
     options.emergency_stop = http_emergency_stop;
     options.devices = http_devices;
+    options.pictures = service->pictures;
     options.context = service;
     return lumi_http_start(&options, &service->http, error);
 }
@@ -365,6 +366,7 @@ static int start_rig(struct lumi_service *service, struct lumi_error *error)
     LUMI_TRY(lumi_pool_create(service->inbox, 1, 1, &service->drives, error));
     LUMI_TRY(lumi_pool_create(service->inbox, judges, JUDGEMENTS, &service->judges, error));
     LUMI_TRY(lumi_pool_create(service->inbox, 1, 4, &service->chores, error));
+    LUMI_TRY(lumi_service_pictures_start(service, error));
     LUMI_TRY(start_link(service, error));
     LUMI_TRY(start_gpio(service, error));
     LUMI_TRY(start_cameras(service, error));
@@ -392,6 +394,8 @@ static void finish(struct lumi_service *service)
     lumi_pool_destroy(service->judges);
     if (service->engine)
         lumi_inbox_run(service->inbox);
+    lumi_pictures_destroy(service->pictures); /* before the cameras: it may hold frames */
+    service->pictures = NULL;
     lumi_engine_destroy(service->engine);
     service->engine = NULL;
     lumi_pool_destroy(service->requests);

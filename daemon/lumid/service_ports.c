@@ -56,6 +56,8 @@ static void judge_done(struct lumi_task *task)
 {
     struct judge_task *asked = (struct judge_task *)task;
 
+    if (asked->code == LUMI_OK)
+        lumi_pictures_sharpness(asked->service->pictures, asked->job.camera, asked->job.shot, asked->numbers.sharpness);
     lumi_engine_judged(asked->service->engine, lumi_service_now(), asked->job.id, asked->code, asked->error.text,
                        asked->code == LUMI_OK ? &asked->numbers : NULL, asked->picture);
 }
@@ -144,6 +146,7 @@ void lumi_service_ports(struct lumi_service *service, struct lumi_engine_ports *
     ports->camera_command = camera_command;
     ports->lamp = lamp;
     ports->judge = judge;
+    ports->picture = lumi_service_picture;
     ports->hand_over = hand_over;
     ports->told = told;
 }

@@ -21,6 +21,9 @@ struct lumi_service {
     struct lumi_http *http;
     struct lumi_handover *handover;
     struct lumi_ingest *ingest;
+    struct lumi_pictures *pictures;
+    uint32_t looked; /* a bit a camera: it is asked for pictures while nothing is under way */
+    int64_t look_ns;
     char *token;
     int lock;
     /* The rig. */
@@ -51,6 +54,10 @@ void *lumi_service_task(size_t size, void (*work)(struct lumi_task *), void (*do
 
 /* service_ports.c: what the engine asks. */
 void lumi_service_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
+/* service_pictures.c: the cameras' pictures. */
+int lumi_service_pictures_start(struct lumi_service *service, struct lumi_error *error);
+void lumi_service_picture(void *context, const struct lumi_engine_picture *picture); /* a port of the engine */
+void lumi_service_pictures_tick(struct lumi_service *service, int64_t now);
 /* service_rig.c */
 void lumi_service_rig_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
 /* Asks the board, or the drive, to stop at the next safe place; a reply is not waited for. To the engine this is a

@@ -237,6 +237,7 @@ void lumi_service_tick(struct lumi_service *service)
 
     lumi_rig_link_snapshot(service->link, &snapshot);
     lumi_engine_rig_status(service->engine, now, &snapshot);
+    lumi_service_pictures_tick(service, now);
     if (llabs(offset - service->utc_offset_ns) > CLOCK_STEP_NS) {
         service->utc_offset_ns = offset;
         lumi_engine_clock(service->engine, offset);

@@ -36,6 +36,7 @@ struct slot {
     /* Between the threads. */
     _Atomic(struct pictures_small *) small; /* waits for the second thread */
     _Atomic(struct lumi_picture *) made;    /* waits to become the last */
+    atomic_bool retell;                     /* more is known of the last */
     atomic_int watchers;
     uint64_t number;
 };
@@ -61,6 +62,19 @@ void lumi_pictures_options_init(struct lumi_pictures_options *options)
 static bool is_camera(const struct lumi_pictures *pictures, int camera)
 {
     return camera >= 0 && camera < pictures->options.cameras;
+}
+
+int lumi_pictures_camera(const struct lumi_pictures *pictures, const char *name)
+{
+    for (int c = 0; c < pictures->options.cameras; c++)
+        if (strcmp(pictures->options.names[c], name) == 0)
+            return c;
+    return -1;
+}
+
+const char *lumi_pictures_name(const struct lumi_pictures *pictures, int camera)
+{
+    return is_camera(pictures, camera) ? pictures->options.names[camera] : "";
 }
 
 /* ---- pictures ---- */
@@ -114,7 +128,10 @@ void lumi_pictures_sharpness(struct lumi_pictures *pictures, int camera, int sho
     slot->sharp[at] = (struct sharp){shot, sharpness};
     if (at == slot->sharp_next)
         slot->sharp_next = (at + 1) % NUMBERS;
+    const bool last = slot->last && slot->last->shot == shot;
     pthread_mutex_unlock(&pictures->lock);
+    if (last && !atomic_exchange(&slot->retell, true) && !pictures->options.synchronous)
+        sem_post(&pictures->copying);
 }
 
 /* ---- whose turn it is ---- */
@@ -240,6 +257,8 @@ static void copy_all(struct lumi_pictures *pictures)
     for (int c = 0; c < pictures->options.cameras; c++) {
         copy_one(pictures, c);
         publish_one(pictures, c);
+        if (atomic_exchange(&pictures->slots[c].retell, false))
+            tell(pictures, c);
     }
 }
 

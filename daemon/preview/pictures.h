@@ -29,10 +29,11 @@ struct lumi_pictures;
 
 struct lumi_pictures_options {
     int cameras;
-    double per_second;         /* of a camera that nobody watches (1) */
-    double watched_per_second; /* of one that somebody does (4) */
-    int width;                 /* of a picture, at most (640) */
-    int quality;               /* of its JPEG (75) */
+    char names[LUMI_PICTURES_CAMERAS][LUMI_PICTURE_NAME]; /* of the cameras */
+    double per_second;                                    /* of a camera that nobody watches (1) */
+    double watched_per_second;                            /* of one that somebody does (4) */
+    int width;                                            /* of a picture, at most (640) */
+    int quality;                                          /* of its JPEG (75) */
     bool synchronous;
 };
 void lumi_pictures_options_init(struct lumi_pictures_options *options);
@@ -61,9 +62,12 @@ void lumi_pictures_work(struct lumi_pictures *pictures);
 
 /* ---- pictures, from any thread ---- */
 
+int lumi_pictures_camera(const struct lumi_pictures *pictures, const char *name); /* −1: there is none of this name */
+const char *lumi_pictures_name(const struct lumi_pictures *pictures, int camera);
+
 struct lumi_picture {
     int camera;
-    uint64_t number; /* of this camera's, 1, 2 … */
+    uint64_t number; /* among this camera's, 1, 2 …; 0: not among them yet */
     char frame[LUMI_PICTURE_NAME];
     int shot;
     int64_t unix_us;
@@ -88,8 +92,8 @@ double lumi_pictures_sharpness_of(struct lumi_pictures *pictures, const struct l
 void lumi_pictures_watch(struct lumi_pictures *pictures, int camera, bool watched);
 int lumi_pictures_watchers(struct lumi_pictures *pictures, int camera);
 
-/* `made` is called in a thread of its own when a camera has a new picture; it must not call back. NULL: nobody; when
- * that has returned it is not called any more. */
+/* `made` is called, in a thread of the library, when a camera has a new picture, or something more is known of the last
+ * one; it must not call back. NULL: nobody; when that has returned it is not called any more. */
 void lumi_pictures_listen(struct lumi_pictures *pictures, void (*made)(void *context, int camera), void *context);
 
 struct lumi_pictures_figures {
