@@ -8,7 +8,7 @@
 
 #include "daemon/engine/engine.h"
 #include "daemon/handover/handover.h"
-#include "daemon/preview/pictures.h"
+#include "daemon/preview/camera_pictures.h"
 
 struct lumi_http;
 struct lumi_http_options {

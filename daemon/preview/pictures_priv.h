@@ -3,7 +3,7 @@
 #define LUMI_DAEMON_PREVIEW_PICTURES_PRIV_H
 
 #include "daemon/camera/camera_device.h"
-#include "daemon/preview/pictures.h"
+#include "daemon/preview/camera_pictures.h"
 #include "proto/base/raster.h"
 
 enum pictures_kind {

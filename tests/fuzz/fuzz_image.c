@@ -1,4 +1,4 @@
-/* Every image reader, from memory: header, pixels, RGB whatever the file has, and one OpenEXR channel. */
+/* Every image reader, from memory: header, pixels, reduced, RGB whatever the file has, and one OpenEXR channel. */
 #include "checks.h"
 
 #include "proto/image/image_priv.h"
@@ -9,10 +9,26 @@
 static void read_channel(const uint8_t *data, size_t size)
 {
     struct lumi_error error = {0};
-    struct image_source source = {data, size, size, "fuzz", &error};
+    struct image_source source = {data, size, size, "fuzz", &error, 0};
     struct lumi_raster raster = {0};
 
     if (checked(image_exr_channel(&source, size % 2 ? "Y" : "B", &raster), &error) == LUMI_OK && raster.channels != 1)
+        abort();
+    lumi_raster_finish(&raster);
+}
+
+static void read_reduced(const uint8_t *data, size_t size, const struct lumi_image_info *whole)
+{
+    struct lumi_image_info info;
+    struct lumi_raster raster;
+    struct lumi_error error = {0};
+
+    if (checked(lumi_image_read_reduced(data, size, "fuzz", 64, &raster, &info, &error), &error) != LUMI_OK) {
+        if (raster.data)
+            abort();
+        return;
+    }
+    if (info.width != whole->width || raster.width > info.width || raster.height > info.height)
         abort();
     lumi_raster_finish(&raster);
 }
@@ -35,6 +51,8 @@ static void read_image(const uint8_t *data, size_t size)
         abort();
     lumi_raster_finish(&raster);
     lumi_image_meta_finish(&meta);
+    if (code == LUMI_OK)
+        read_reduced(data, size, &info);
     if (image_exr.probe(data, size))
         read_channel(data, size);
 }

@@ -10,8 +10,8 @@
  * waits.
  * 3. The thread of low priority holds no lock of ours: pointers change hands.
  * 4. It reads no clock. With `synchronous` there are no threads: lumi_pictures_work does the work. */
-#ifndef LUMI_DAEMON_PREVIEW_PICTURES_H
-#define LUMI_DAEMON_PREVIEW_PICTURES_H
+#ifndef LUMI_DAEMON_PREVIEW_CAMERA_PICTURES_H
+#define LUMI_DAEMON_PREVIEW_CAMERA_PICTURES_H
 
 #include "proto/base/result.h"
 

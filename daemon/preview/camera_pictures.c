@@ -1,6 +1,6 @@
 /* Who gets a turn, and the two threads: one that copies and keeps order, one that makes pictures when nobody else wants
  * the processor. Between them pointers change hands without a lock. */
-#include "daemon/preview/pictures.h"
+#include "daemon/preview/camera_pictures.h"
 
 #include "daemon/preview/pictures_priv.h"
 #include "proto/base/memory.h"
