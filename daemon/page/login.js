@@ -1,0 +1,226 @@
+// Who is here: the session, logging in where one stands (the view stays as it is), pairing of phones.
+import { ApiError, get, onLogin, post, setCsrf } from "./api.js";
+import * as dialog from "./dialog.js";
+import { fill, h } from "./dom.js";
+import { duration, t } from "./i18n.js";
+import { store } from "./store.js";
+import * as stream from "./stream.js";
+import { errorWords, noticeBox } from "./words.js";
+
+// A lumid without users and sessions answers its own computer only: whoever sees the page is the operator.
+const LOCAL = { users: false, you: { name: "this computer", role: "operate", via: "local" }, csrf: null,
+    expires: null, secure: null };
+
+let asking = null;
+let fallback = false;
+
+function keep(session) {
+    const before = store.get("session");
+
+    setCsrf(session.csrf ?? null);
+    document.dispatchEvent(new CustomEvent("lumi-session", { detail: { csrf: session.csrf ?? null } }));
+    if (JSON.stringify(before) !== JSON.stringify(session))
+        store.set("session", session);
+    return session;
+}
+
+export async function fetchSession() {
+    try {
+        return keep(await get("/api/v1/session", { quiet: true }));
+    } catch (error) {
+        if (error.word === "absent") {
+            fallback = true;
+            return keep(LOCAL);
+        }
+        throw error;
+    }
+}
+
+export function sessionsOffered() {
+    return !fallback;
+}
+
+// The code of a QR link is used once and taken out of the address, so that no history or bookmark keeps it.
+function codeOfAddress() {
+    const found = /^#pair=([\w-]{4,64})$/.exec(location.hash);
+
+    if (found)
+        history.replaceState(null, "", location.pathname + location.search);
+    return found ? found[1] : null;
+}
+
+async function logIn(body) {
+    keep(await post("/api/v1/session/login", body, { quiet: true }));
+    if (!store.get("session").you)
+        throw new ApiError(401, "login", "");
+}
+
+function limited(error, button) {
+    // What lumid says of how long is in the detail; the button is given back after a while in any case.
+    button.disabled = true;
+    setTimeout(() => {
+        button.disabled = false;
+    }, error.word === "limit" ? 3000 : 0);
+}
+
+function form(fields, test, said, done) {
+    const button = h("button", { type: "submit", class: "primary", test }, t("login.submit"));
+
+    return h("form", { on: { submit: async (event) => {
+        event.preventDefault();
+        const body = {};
+        for (const input of event.target.querySelectorAll("input"))
+            body[input.name] = input.name === "code" ? input.value.trim() : input.value;
+        button.disabled = true;
+        said.say("info", t("login.asking"));
+        try {
+            await logIn(body);
+            done();
+        } catch (error) {
+            said.error(error);
+            const password = event.target.querySelector("[name=password], [name=code]");
+            password.value = "";
+            password.focus();
+            limited(error, button);
+        }
+    } } }, fields, h("div", { class: "row end" }, button));
+}
+
+function field(name, test, attributes) {
+    return h("label", { class: "field" }, h("span", {}, t(`login.${name}`)), h("input", { name, test, ...attributes }));
+}
+
+function dialogOf(reason) {
+    const said = noticeBox();
+    let box = null;
+    const done = () => box.close(true);
+
+    if (reason)
+        said.say("info", reason);
+    box = dialog.show(t("login.title"), [
+        said.element,
+        form([
+            field("name", "login-name", { autocomplete: "username", required: true, autocapitalize: "none",
+                spellcheck: "false", maxlength: 255 }),
+            field("password", "login-password", { type: "password", autocomplete: "current-password",
+                required: true, maxlength: 1024 }),
+        ], "login-submit", said, done),
+        h("details", { open: matchMedia("(pointer: coarse)").matches },
+            h("summary", {}, t("login.byCode")),
+            h("p", {}, t("login.codeHelp")),
+            form([field("code", "login-code", { autocomplete: "one-time-code", required: true, spellcheck: "false",
+                autocapitalize: "characters", maxlength: 64 })], "login-code-submit", said, done)),
+        h("p", { class: "why" }, t("login.forgot")),
+    ], { test: "login", keep: true });
+    return box.closed;
+}
+
+// The dialog, once however many ask. Until somebody has logged in, nothing else is to be had; the emergency stop says
+// what it can.
+export function openLogin(reason) {
+    asking ??= dialogOf(reason).finally(() => {
+        asking = null;
+    });
+    return asking;
+}
+
+// A request was refused: true when there is a session now.
+async function refused(error) {
+    const session = await fetchSession();
+
+    if (session.you)
+        return true;
+    return openLogin(error.word === "csrf" || !store.get("capture") ? "" : t("login.ranOut"));
+}
+
+export async function startSession() {
+    const code = codeOfAddress();
+
+    onLogin(refused);
+    document.addEventListener("lumi-login", () => openLogin(t("login.ranOut")));
+    if (code) {
+        try {
+            await logIn({ code });
+            return;
+        } catch (error) {
+            await fetchSession().catch(() => {});
+            if (!store.get("session")?.you)
+                await openLogin(errorWords(error));
+            return;
+        }
+    }
+    // Where lumid does not answer (yet) the stream finds out when it does, and a session that is lacking is asked for.
+    await fetchSession().catch(() => {});
+}
+
+export async function requireSession() {
+    const session = store.get("session");
+
+    if (session && !session.you)
+        await openLogin("");
+}
+
+export async function logOut() {
+    await post("/api/v1/session/logout", {}, { quiet: true });
+    stream.stop();
+    location.reload(); // nothing of what was seen stays
+}
+
+// The QR is lumid's own picture: as an image, never as markup of this page.
+function pairing(pair, box) {
+    const left = h("strong", { test: "pair-left" });
+    const url = URL.createObjectURL(new Blob([pair.qr ?? ""], { type: "image/svg+xml" }));
+    const tick = () => {
+        const seconds = (new Date(pair.expires) - Date.now()) / 1000;
+
+        left.textContent = seconds > 0 ? t("pair.left", { time: duration(seconds) }) : t("pair.over");
+        if (!box.isConnected) {
+            clearInterval(timer);
+            URL.revokeObjectURL(url);
+        }
+    };
+    const timer = setInterval(tick, 1000);
+
+    queueMicrotask(tick);
+    return [
+        h("p", {}, t(`pair.how.${pair.role}`)),
+        h("img", { class: "qr", src: url, alt: t("pair.qr"), test: "pair-qr" }),
+        h("dl", { class: "facts" },
+            h("dt", {}, t("pair.address")), h("dd", { test: "pair-url" }, String(pair.url ?? "").split("#")[0]),
+            h("dt", {}, t("pair.code")), h("dd", { class: "code", test: "pair-code" }, pair.code),
+            h("dt", {}, t("pair.fingerprint")), h("dd", { class: "code small" }, pair.fingerprint ?? t("unknown"))),
+        h("p", {}, left),
+        h("p", { class: "why" }, t("pair.certificate")),
+    ];
+}
+
+export async function openPair() {
+    const said = noticeBox();
+    const shown = h("div", {});
+    const role = h("select", { test: "pair-role" }, h("option", { value: "operate" }, t("role.operate")),
+        h("option", { value: "watch" }, t("role.watch")));
+    let box = null;
+    const make = async () => {
+        said.clear();
+        fill(shown);
+        try {
+            const pair = await post("/api/v1/session/pair", { role: role.value });
+            fill(shown, pairing({ ...pair, role: role.value }, shown));
+        } catch (error) {
+            said.error(error);
+        }
+    };
+
+    if (!store.get("session")?.users) {
+        await dialog.ask(t("pair.title"), [h("p", {}, t("pair.noUsers")), h("pre", { class: "code" }, "sudo lumi user add NAME --role operate"),
+            h("p", {}, t("pair.noUsersThen"))], { confirm: t("close") });
+        return;
+    }
+    box = dialog.show(t("pair.title"), [
+        h("div", { class: "row" }, h("label", { class: "field" }, h("span", {}, t("pair.may")), role),
+            h("button", { type: "button", class: "primary", test: "pair-make", on: { click: make } }, t("pair.make"))),
+        said.element, shown,
+        h("div", { class: "row end" }, h("button", { type: "button", on: { click: () => box.close() } }, t("close"))),
+    ], { test: "pair-dialog" });
+    await box.closed;
+}

@@ -1,0 +1,209 @@
+// The stream of events (docs/api.md), read by fetch rather than by EventSource: so the comments that say "still here"
+// and the status of a refusal are seen, and the id of the last event outlives every new attempt.
+import { get, ApiError } from "./api.js";
+import { store } from "./store.js";
+
+const SILENT_MS = 4000; // nothing heard for so long: lumid is asked whether it is there
+const PROBE_MS = 4000;
+const TRY_FIRST_MS = 500;
+const TRY_MOST_MS = 8000;
+const HIDDEN_MS = 60000; // a page nobody looks at gives its connection back
+
+const listeners = new Map();
+let wanted = false;
+let running = false;
+let abort = null;
+let lastId = null;
+let heard = 0;
+let probing = false;
+let wake = null;
+let hiddenTimer = null;
+
+// "open" and "lost" are told too; "open" after every (re)connection: what was missed is to be fetched.
+export function on(name, call) {
+    if (!listeners.has(name))
+        listeners.set(name, new Set());
+    listeners.get(name).add(call);
+    return () => listeners.get(name).delete(call);
+}
+
+function emit(name, data, id) {
+    for (const call of [...(listeners.get(name) ?? [])]) {
+        try {
+            call(data, id);
+        } catch (error) {
+            console.error(error); // one view's mistake does not take the events from the others
+        }
+    }
+    if (name !== "*" && name !== "open" && name !== "lost")
+        emit("*", { kind: name, data, id });
+}
+
+function connection(state) {
+    if (store.get("connection").state === state)
+        return;
+    store.set("connection", { state, since: new Date() });
+    if (state !== "connecting")
+        emit(state);
+}
+
+// Fields of one event after another, as the HTML Living Standard (9.2.6) has them.
+export function parser(tell) {
+    let rest = "", kind = "", data = [], id;
+
+    const line = (text) => {
+        if (text === "") {
+            if (data.length)
+                tell(kind || "message", data.join("\n"), id);
+            kind = "";
+            data = [];
+            return;
+        }
+        const colon = text.indexOf(":");
+        const name = colon < 0 ? text : text.slice(0, colon);
+        const value = colon < 0 ? "" : text.slice(colon + 1).replace(/^ /, "");
+
+        if (name === "event")
+            kind = value;
+        else if (name === "data")
+            data.push(value);
+        else if (name === "id" && !value.includes("\0"))
+            id = value;
+    };
+    return (text) => {
+        rest += text;
+        // A carriage return at the end may be the first half of a line's end.
+        const lines = rest.split(/\r\n|\n|\r(?!$)/);
+        rest = lines.pop();
+        for (const one of lines)
+            line(one);
+    };
+}
+
+function told(kind, text, id) {
+    let data;
+
+    try {
+        data = JSON.parse(text);
+    } catch {
+        return; // not lumid's
+    }
+    if (id !== undefined)
+        lastId = id;
+    emit(kind, data, id);
+}
+
+async function listen() {
+    const headers = { Accept: "text/event-stream" };
+
+    if (lastId)
+        headers["Last-Event-ID"] = lastId;
+    abort = new AbortController();
+    const timer = setTimeout(() => abort.abort(), PROBE_MS * 2);
+    const answer = await fetch("/api/v1/events", { headers, signal: abort.signal, cache: "no-store" });
+
+    clearTimeout(timer);
+    if (!answer.ok)
+        throw new ApiError(answer.status, "events", answer.statusText);
+    heard = Date.now();
+    connection("open");
+    const reader = answer.body.getReader();
+    const decoder = new TextDecoder();
+    const feed = parser(told);
+    for (;;) {
+        const { value, done } = await reader.read();
+        if (done)
+            return;
+        heard = Date.now();
+        feed(decoder.decode(value, { stream: true }));
+    }
+}
+
+const pause = (ms) => new Promise((resolve) => {
+    const timer = setTimeout(resolve, ms);
+
+    wake = () => {
+        clearTimeout(timer);
+        resolve();
+    };
+});
+
+async function run() {
+    let wait = TRY_FIRST_MS;
+
+    running = true;
+    while (wanted) {
+        const began = Date.now();
+
+        try {
+            await listen();
+        } catch (error) {
+            if (error.status === 401) {
+                connection("lost");
+                // Asks for the login, in place; the stream goes on when there is a session again.
+                await get("/api/v1/capture").catch(() => {});
+            } else if (error.status !== 0 && error.status !== undefined) {
+                console.warn(`events: ${error.status} ${error.message}`);
+            }
+        }
+        abort = null;
+        if (!wanted)
+            break;
+        connection("lost");
+        wait = Date.now() - began > TRY_MOST_MS ? TRY_FIRST_MS : Math.min(wait * 2, TRY_MOST_MS);
+        await pause(wait);
+    }
+    running = false;
+}
+
+async function probe() {
+    if (!wanted || probing || !abort || store.get("connection").state !== "open")
+        return;
+    probing = true;
+    try {
+        await get("/api/v1/capture", { patience: PROBE_MS, quiet: true });
+        heard = Date.now();
+    } catch (error) {
+        if (error.status === 0 && error.word !== "stopped")
+            abort?.abort();
+    }
+    probing = false;
+}
+
+export function start() {
+    if (wanted)
+        return;
+    wanted = true;
+    heard = Date.now();
+    if (!running)
+        run();
+}
+
+export function stop() {
+    wanted = false;
+    abort?.abort();
+    wake?.();
+}
+
+setInterval(() => {
+    if (Date.now() - heard > SILENT_MS)
+        probe();
+}, 1000);
+
+// "offline" says that there is no network, which is no matter for a lumid on this very computer: it is only asked.
+for (const name of ["online", "offline"])
+    addEventListener(name, () => {
+        wake?.();
+        probe();
+    });
+
+document.addEventListener("visibilitychange", () => {
+    clearTimeout(hiddenTimer);
+    if (document.hidden && wanted)
+        hiddenTimer = setTimeout(() => {
+            stop();
+            connection("connecting");
+        }, HIDDEN_MS);
+    else if (!document.hidden && !wanted && store.get("session")?.you)
+        start();
+});

@@ -1,0 +1,66 @@
+// lumid's words into words for a crew: states, verdicts, checks, and what went wrong with what to do about it.
+import { has, t } from "./i18n.js";
+import { h } from "./dom.js";
+
+export const ICONS = { green: "✔", yellow: "!", red: "✖", undecided: "…" };
+
+export function stateWord(state) {
+    return has(`state.${state}`) ? t(`state.${state}`) : state;
+}
+
+// "trigger c03" is the check "trigger" of the camera c03; "disk speed" is one of its own.
+function family(name) {
+    if (has(`check.${name}`))
+        return { key: `check.${name}`, camera: "" };
+    const space = name.indexOf(" ");
+    const key = `check.${name.slice(0, space)}`;
+
+    return space > 0 && has(key) ? { key, camera: name.slice(space + 1) } : { key: null, camera: "" };
+}
+
+export function checkTitle(name) {
+    const { key, camera } = family(name);
+
+    if (!key)
+        return name;
+    return camera ? `${t(key)}: ${camera}` : t(key);
+}
+
+export function checkTodo(name, verdict) {
+    const { key } = family(name);
+
+    if (verdict === "green" || verdict === "undecided" || !key)
+        return "";
+    return has(`${key}.todo`) ? t(`${key}.todo`) : "";
+}
+
+// An ApiError in words, with what to do. lumid's own line is shown as it is.
+export function errorWords(error) {
+    const key = has(`error.${error.word}`) ? `error.${error.word}` : error.status >= 500 ? "error.internal" : "";
+
+    if (!key)
+        return error.detail ? t("error.other", { detail: error.detail }) : t("error.unknown");
+    return t(key, { detail: error.detail ?? "" });
+}
+
+// A place for what came of something, beside what was pressed: say("good" | "bad" | "info", text), clear().
+export function noticeBox(test = "notice") {
+    const element = h("p", { class: "notice", role: "status", test, hidden: true });
+
+    return {
+        element,
+        say(kind, text, ...more) {
+            element.hidden = false;
+            element.dataset.kind = kind;
+            element.replaceChildren(kind === "bad" ? `${ICONS.red} ` : kind === "good" ? `${ICONS.green} ` : "", text,
+                ...more);
+        },
+        error(error) {
+            this.say("bad", errorWords(error));
+        },
+        clear() {
+            element.hidden = true;
+            element.replaceChildren();
+        },
+    };
+}
