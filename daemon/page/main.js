@@ -10,11 +10,15 @@ import { store } from "./store.js";
 import * as stream from "./stream.js";
 import { errorWords, stateWord } from "./words.js";
 
+import { view as captures } from "./view_captures.js";
+import { view as people } from "./view_people.js";
 import { view as plans } from "./view_plans.js";
+import { view as preview } from "./view_preview.js";
 import { view as rig } from "./view_rig.js";
+import { view as sweep } from "./view_sweep.js";
 
 // As they stand in the navigation. A view: {name, mount(root), unmount()}; its title is the text "nav.NAME".
-const views = [rig, plans];
+const views = [rig, sweep, preview, captures, plans, people];
 
 let shown = null;
 
