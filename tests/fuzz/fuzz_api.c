@@ -1,5 +1,5 @@
-/* What the API takes apart of a request: addresses, headers, bodies. The first byte picks which. What is accepted is as
- * the table of fields says, and nothing else is. */
+/* What the API takes apart of a request: addresses, headers, paths, queries, bodies. The first byte picks which. What
+ * is accepted is as the table of fields says, and nothing else is. */
 #include "checks.h"
 
 #include "daemon/http/api_request.h"
@@ -50,6 +50,34 @@ static void read_body(const char *text, size_t size)
     lumi_api_body_clear(&body);
 }
 
+static const struct lumi_api_field queried[] = {
+    {.name = "yaw", .type = LUMI_API_NUMBER, .least = -4, .most = 4},
+    {.name = "width", .type = LUMI_API_INT, .max = 4096},
+    {.name = "fast", .type = LUMI_API_BOOL},
+    {.name = "word", .type = LUMI_API_STRING, .max = 8},
+    {0},
+};
+
+static void read_query(const char *text)
+{
+    struct lumi_api_body body = {0};
+    struct lumi_error error = {0};
+
+    if (checked(lumi_api_query_parse(text, queried, &body, &error), &error) == LUMI_OK &&
+        (!(body.values[0].real >= -4 && body.values[0].real <= 4) || body.values[1].number > 4096 ||
+         (body.values[3].string && strlen(body.values[3].string) > 8)))
+        abort();
+    lumi_api_body_clear(&body);
+}
+
+static void read_path(const char *text)
+{
+    char part[LUMI_API_STRING_MAX + 1];
+
+    if (lumi_api_path_match("/a/{name}/b", text, part) && (!part[0] || part[0] == '.' || strchr(part, '/')))
+        abort();
+}
+
 static void read_headers(int which, const char *text)
 {
     struct lumi_api_listen listen;
@@ -80,7 +108,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
     if (!size)
         return 0;
-    if (data[0] % 6 == 0) {
+    if (data[0] % 6 == 0 && data[0] < 128) {
         read_body((const char *)data + 1, size - 1);
         read_numbers((const char *)data + 1, size - 1);
         return 0;
@@ -89,6 +117,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     memcpy(text, data + 1, size - 1);
     text[size - 1] = '\0';
+    if (data[0] >= 128) {
+        read_query(text);
+        read_path(text);
+        return 0;
+    }
     read_headers(data[0] % 6, text);
     return 0;
 }
