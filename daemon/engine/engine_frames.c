@@ -122,7 +122,6 @@ static struct engine_filing *describe(const struct lumi_engine *e, int shot, int
     filing->about = (struct lumi_frame_about){.make = filing->vendor,
                                               .model = filing->model[0] ? filing->model : NULL,
                                               .serial = filing->serial,
-                                              .black = set->black,
                                               .white = {set->white_red, set->white_blue},
                                               .unix_us = engine_unix_us(e, exposed_ns)};
     return filing;

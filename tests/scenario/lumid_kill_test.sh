@@ -11,15 +11,8 @@ here=$(cd "$(dirname "$0")" && pwd)
 # ---- inside the rig's network ----
 
 start() {
-    "$lumid" --config "$LUMI_SIM_RIG/lumid.conf" >>"$LUMI_SIM_RIG/lumid.log" 2>&1 &
-    daemon=$!
-    tries=0
-    until "$lumi" capture status >status.txt 2>&1; do
-        tries=$((tries + 1))
-        [ $tries -lt 600 ] || fail "the daemon does not answer"
-        kill -0 $daemon || fail "the daemon has ended"
-        sleep 0.1
-    done
+    launch_daemon
+    await_daemon
 }
 state() { # what its status says of the state: one word
     "$lumi" capture status >status.txt 2>&1 || fail "no status: $(cat status.txt)"

@@ -5,17 +5,7 @@
 set -u
 lumid=$1 lumi=$2
 . "$(dirname "$0")/expect.sh"
-cd "$scratch" || exit 1
-daemon= board=
-stop_all() {
-    for process in $daemon $board; do
-        kill -9 "$process" 2>/dev/null
-    done
-    chmod -R u+w "$scratch"
-    rm -rf "$scratch"
-}
-trap stop_all EXIT
-unset NOTIFY_SOCKET WATCHDOG_USEC JOURNAL_STREAM LUMID_TOKEN
+. "$(dirname "$0")/lumid_alone.sh"
 
 # ---- the configuration ----
 

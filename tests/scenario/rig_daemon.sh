@@ -14,20 +14,27 @@ need_network() {
     }
 }
 
-# Within the rig's network: the daemon, until this shell ends.
-start_daemon() { # PORT
-    export LUMID_ADDRESS=http://localhost:$1
-    "$lumid" --config "$LUMI_SIM_RIG/lumid.conf" >"$LUMI_SIM_RIG/lumid.log" 2>&1 &
+launch_daemon() {
+    "$lumid" --config "$LUMI_SIM_RIG/lumid.conf" >>"$LUMI_SIM_RIG/lumid.log" 2>&1 &
     daemon=$!
-    trap 'kill $daemon 2>/dev/null; wait $daemon || true' EXIT
-    trap 'exit 1' INT TERM
+}
+await_daemon() {
     tries=0
     until "$lumi" capture status >status.txt 2>&1; do
         tries=$((tries + 1))
-        [ $tries -lt 200 ] || fail "the daemon does not answer"
+        [ $tries -lt 300 ] || fail "the daemon does not answer"
         kill -0 $daemon || fail "the daemon has ended"
         sleep 0.2
     done
+}
+# Within the rig's network: the daemon, until this shell ends.
+start_daemon() { # PORT
+    export LUMID_ADDRESS=http://localhost:$1
+    : >"$LUMI_SIM_RIG/lumid.log"
+    launch_daemon
+    trap 'kill $daemon 2>/dev/null; wait $daemon || true' EXIT
+    trap 'exit 1' INT TERM
+    await_daemon
 }
 
 # Starts the plan and watches it from then on, in watch.txt. On a busy computer a frame of a test may be lost: once more.

@@ -150,6 +150,37 @@ static void a_rig_that_turns_smears_its_pictures_and_one_that_stands_does_not(vo
     sim_rig_finish(&rig);
 }
 
+static void a_camera_that_was_run_into_looks_to_its_right(void **state)
+{
+    struct fixture *f = *state;
+    const double askew = 0.2, c = cos(askew), s = sin(askew);
+    struct lumi_raster seen, truth, straight;
+    struct sim_rig rig;
+
+    make_rig(&rig, "arc:3x6:0.2");
+    const struct sim_view *view = &rig.views[4];
+    struct sim_moment moment = {.angle = view->turn_angle, .drop = view->drop, .askew = askew};
+    struct lumi_pose pose = view->pose;
+    for (int row = 0; row < 3; row++) { /* columns: right, down, forward; the eye stays where it is */
+        pose.r[3 * row] = c * view->pose.r[3 * row] - s * view->pose.r[3 * row + 2];
+        pose.r[3 * row + 2] = s * view->pose.r[3 * row] + c * view->pose.r[3 * row + 2];
+    }
+    assert_int_equal(sim_camera_render(f->scene, &view->lens, &pose, 1, &truth, NULL, NULL), LUMI_OK);
+    assert_int_equal(sim_camera_render(f->scene, &view->lens, &view->pose, 1, &straight, NULL, NULL), LUMI_OK);
+    assert_int_equal(sim_exposure_render(f->scene, &rig.profile, view->camera, &moment, 1, &seen, NULL), LUMI_OK);
+    double aside = 0;
+    for (int y = 0; y < seen.height; y++)
+        for (int i = 0; i < 3 * seen.width; i++) {
+            assert_float_equal(lumi_row_f32(&seen, y)[i], lumi_row_f32(&truth, y)[i], 1e-5);
+            aside += fabs((double)(lumi_row_f32(&seen, y)[i] - lumi_row_f32(&straight, y)[i]));
+        }
+    assert_true(aside / (3.0 * seen.width * seen.height) > 0.01); /* there is something to tell them apart by */
+    lumi_raster_finish(&seen);
+    lumi_raster_finish(&truth);
+    lumi_raster_finish(&straight);
+    sim_rig_finish(&rig);
+}
+
 static void sensor_values_are_a_file_that_develops_to_the_picture(void **state)
 {
     struct fixture *f = *state;
@@ -248,6 +279,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_capture_holds_every_frame_with_its_true_pose),
         cmocka_unit_test(a_rig_that_turns_smears_its_pictures_and_one_that_stands_does_not),
+        cmocka_unit_test(a_camera_that_was_run_into_looks_to_its_right),
         cmocka_unit_test(sensor_values_are_a_file_that_develops_to_the_picture),
         cmocka_unit_test(views_can_be_given_one_by_one),
         cmocka_unit_test(truth_writes_the_bytes_again_for_any_number_of_threads),
