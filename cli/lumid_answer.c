@@ -72,6 +72,7 @@ static int code_of(const char *word)
         {"checksum", LUMI_ERR_CHECKSUM},   {"notfound", LUMI_ERR_NOTFOUND},
         {"exists", LUMI_ERR_EXISTS},       {"limit", LUMI_ERR_LIMIT},
         {"token", LUMI_ERR_ARG},           {"host", LUMI_ERR_ARG},
+        {"session", LUMI_ERR_ARG},         {"role", LUMI_ERR_ARG},
     };
 
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++)

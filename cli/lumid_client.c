@@ -1,12 +1,13 @@
 /* lumid, as the commands reach it. */
 #include "cli/lumid_client.h"
 
+#include "cli/access_files.h"
+
 #include <errno.h>
 #include <libsoup/soup.h>
 #include <string.h>
 
 #define DEFAULT_ADDRESS "localhost:8470"
-#define SYSTEM_CONFIG "/etc/lumisphere/lumid.conf"
 #define ANSWER_SECONDS 30
 
 char *cli_lumid_address, *cli_lumid_token_file, *cli_lumid_ca;
@@ -14,10 +15,12 @@ char *cli_lumid_address, *cli_lumid_token_file, *cli_lumid_ca;
 struct cli_lumid {
     SoupSession *session, *stream; /* the stream's has no end to its waits */
     char *url, *token;
+    char *local; /* the file that this computer's lumid left its token in; NULL: there is none, or another was given */
 };
 
 struct settings {
     char *address, *token, *token_file, *ca;
+    char *here; /* where this computer's lumid listens */
 };
 
 /* ---- where it is ---- */
@@ -48,7 +51,7 @@ static void read_system_config(struct settings *settings)
     g_autoptr(GKeyFile) file = g_key_file_new();
     g_autofree char *listen = NULL, *certificate = NULL;
 
-    if (settings->address || !g_key_file_load_from_file(file, SYSTEM_CONFIG, G_KEY_FILE_NONE, NULL))
+    if (!g_key_file_load_from_file(file, CLI_SYSTEM_CONFIG, G_KEY_FILE_NONE, NULL))
         return;
     listen = g_key_file_get_string(file, "http", "listen", NULL);
     certificate = g_key_file_get_string(file, "http", "certificate", NULL);
@@ -56,9 +59,12 @@ static void read_system_config(struct settings *settings)
         const char *port = strrchr(listen, ':');
         bool all =
             g_str_has_prefix(listen, "*:") || g_str_has_prefix(listen, "0.0.0.0:") || g_str_has_prefix(listen, "[::]:");
-        settings->address = g_strdup_printf("%s://%s%s", certificate && *certificate ? "https" : "http",
-                                            all ? "localhost" : listen, all && port ? port : "");
+        settings->here = g_strdup_printf("%s://%s%s", certificate && *certificate ? "https" : "http",
+                                         all ? "localhost" : listen, all && port ? port : "");
     }
+    if (settings->address)
+        return;
+    settings->address = g_strdup(settings->here);
     if (certificate && *certificate && !settings->ca)
         settings->ca = g_steal_pointer(&certificate);
 }
@@ -105,6 +111,21 @@ static int read_token(const char *path, char **token, struct lumi_error *error)
     return LUMI_OK;
 }
 
+/* What this computer's lumid leaves for those who may use it: nobody else's is shown it. */
+static void take_local_token(const struct settings *settings, struct cli_lumid *lumid)
+{
+    g_autofree char *url = NULL, *path = NULL;
+    struct lumi_error error;
+
+    if (make_url(settings->here ? settings->here : DEFAULT_ADDRESS, &url, &error) != LUMI_OK ||
+        strcmp(url, lumid->url) != 0)
+        return;
+    path = cli_access_path("local.token");
+    if (read_token(path, &lumid->token, &error) != LUMI_OK && !g_file_test(path, G_FILE_TEST_IS_REGULAR))
+        return;
+    lumid->local = g_steal_pointer(&path);
+}
+
 static int make_sessions(struct cli_lumid *lumid, const char *ca, struct lumi_error *error)
 {
     g_autoptr(GTlsDatabase) database = NULL;
@@ -136,6 +157,8 @@ int cli_lumid_open(struct cli_lumid **lumid, struct lumi_error *error)
     made->token = g_strdup(settings.token);
     if (!made->token && settings.token_file)
         LUMI_GOTO(code, out, read_token(settings.token_file, &made->token, error));
+    if (!made->token)
+        take_local_token(&settings, made);
     LUMI_GOTO(code, out, make_sessions(made, g_str_has_prefix(made->url, "https") ? settings.ca : NULL, error));
     *lumid = g_steal_pointer(&made);
 out:
@@ -144,6 +167,7 @@ out:
     g_free(settings.token);
     g_free(settings.token_file);
     g_free(settings.ca);
+    g_free(settings.here);
     return code;
 }
 
@@ -155,6 +179,7 @@ void cli_lumid_close(struct cli_lumid *lumid)
     g_clear_object(&lumid->stream);
     g_free(lumid->url);
     g_free(lumid->token);
+    g_free(lumid->local);
     g_free(lumid);
 }
 
@@ -187,6 +212,16 @@ static int no_answer(const struct cli_lumid *lumid, const GError *failed, struct
     return lumi_fail(error, LUMI_ERR_IO, "no answer from lumid at %s: %s", lumid->url, failed->message);
 }
 
+static int nobody(const struct cli_lumid *lumid, struct lumi_error *error)
+{
+    if (lumid->local)
+        return lumi_fail(error, LUMI_ERR_ARG, "%s cannot be read: be root, or in the group of that file", lumid->local);
+    return lumi_fail(error, LUMI_ERR_ARG,
+                     "lumid at %s answers to its users only: --token-file names a file with its token (on its own "
+                     "computer local.token in the folder [http] access)",
+                     lumid->url);
+}
+
 static int ask(struct cli_lumid *lumid, SoupMessage *message, JsonNode **root, char **text, struct lumi_error *error)
 {
     g_autoptr(GError) failed = NULL;
@@ -198,7 +233,9 @@ static int ask(struct cli_lumid *lumid, SoupMessage *message, JsonNode **root, c
     if (!bytes)
         return no_answer(lumid, failed, error);
     node = cli_answer_parse(g_bytes_get_data(bytes, NULL), (gssize)g_bytes_get_size(bytes));
-    if (status < 200 || status > 299 || !node)
+    if (status == 401 && !lumid->token)
+        code = nobody(lumid, error);
+    else if (status < 200 || status > 299 || !node)
         code = cli_answer_problem(lumid->url, status, node, error);
     else if (text)
         *text = g_strndup(g_bytes_get_data(bytes, NULL), g_bytes_get_size(bytes));
@@ -254,7 +291,8 @@ static int listen_once(struct cli_lumid *lumid, struct cli_event_reader *reading
         gsize size = 0;
         g_input_stream_read_all(G_INPUT_STREAM(lines), text, sizeof text, &size, NULL, NULL);
         JsonNode *root = cli_answer_parse(text, (gssize)size);
-        int code = cli_answer_problem(lumid->url, status, root, error);
+        int code =
+            status == 401 && !lumid->token ? nobody(lumid, error) : cli_answer_problem(lumid->url, status, root, error);
         if (root)
             json_node_unref(root);
         return code;

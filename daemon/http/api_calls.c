@@ -313,6 +313,12 @@ const struct lumi_api_route lumi_api_routes[] = {
     {"/metrics", "GET", LUMI_API_WATCH, NULL, get_metrics, NULL},
     {"/", "GET", LUMI_API_ANYBODY, NULL, NULL, lumi_api_serve_page},
     {"/page/{name}", "GET", LUMI_API_ANYBODY, NULL, NULL, lumi_api_serve_page},
+    {"/api/v1/session", "GET", LUMI_API_ANYBODY, NULL, NULL, lumi_api_serve_session},
+    {"/api/v1/session/login", "POST", LUMI_API_ANYBODY, lumi_api_login_fields, NULL, lumi_api_serve_login},
+    {"/api/v1/session/logout", "POST", LUMI_API_WATCH, no_fields, NULL, lumi_api_serve_logout},
+    {"/api/v1/session/pair", "POST", LUMI_API_OPERATE, lumi_api_pair_fields, NULL, lumi_api_serve_pair},
+    {"/api/v1/session/revoke", "POST", LUMI_API_OPERATE, lumi_api_revoke_fields, NULL, lumi_api_serve_revoke},
+    {"/api/v1/session/people", "GET", LUMI_API_WATCH, NULL, NULL, lumi_api_serve_people},
     {"/openapi.json", "GET", LUMI_API_WATCH, NULL, get_openapi, NULL},
     {0},
 };

@@ -39,6 +39,7 @@ struct listener {
     uint64_t next;      /* number of the event it gets next */
     uint64_t latest;    /* number of the last of those that it has seen */
     uint64_t progress;  /* the progress it has seen */
+    uint64_t people;    /* and the people */
     bool busy;          /* a block is on its way */
     int64_t written_ns; /* when the last one was */
 };
@@ -290,6 +291,23 @@ static void put_latest(struct listener *listener, GString *block)
     }
 }
 
+/* Each sees themselves among them. */
+static void put_people(struct listener *listener, GString *block)
+{
+    struct lumi_http *http = listener->events->http;
+    g_autoptr(JsonBuilder) builder = NULL;
+
+    if (listener->people == lumi_api_people_number(http))
+        return;
+    builder = json_builder_new();
+    json_builder_begin_object(builder);
+    lumi_api_people_put(http, listener->message, builder);
+    json_builder_end_object(builder);
+    g_autofree char *text = lumi_api_finish(builder);
+    put_event(block, "people", text);
+    listener->people = lumi_api_people_number(http);
+}
+
 /* The next block for somebody who has taken the last one. */
 static void pump(struct listener *listener)
 {
@@ -314,6 +332,7 @@ static void pump(struct listener *listener)
     }
     if (listener->next == events->next)
         put_latest(listener, block);
+    put_people(listener, block);
     if (!block->len && events->http->options.now_ns(events->http->options.context) - listener->written_ns > PING_NS)
         g_string_append(block, ": here\n\n");
     if (block->len)
@@ -362,7 +381,7 @@ bool lumi_api_has_hung_up(GSocket *socket)
 /* Hangs up on who has hung up, and on who takes nothing: the next write fails, and the message is finished. */
 static void look_after(struct listener *listener, int64_t now)
 {
-    GSocket *socket = soup_server_message_get_socket(listener->message);
+    GSocket *socket = lumi_api_socket(listener->message);
 
     if (!socket || (!lumi_api_has_hung_up(socket) && !(listener->busy && now - listener->written_ns > PATIENCE_NS)))
         return;

@@ -28,7 +28,8 @@ struct connection {
     guint8 peer[16];
     gsize peer_size; /* 0: unknown */
     bool here;       /* this computer */
-    bool waiting;    /* for a request: nothing is being answered */
+    bool tls;
+    bool waiting; /* for a request: nothing is being answered */
     int64_t until_ns;
 };
 
@@ -53,24 +54,37 @@ static int64_t now(const struct lumi_api_guard *guard)
 /* ---- connections ---- */
 
 /* An IPv6 peer is a network of 64 bits: whoever has one has all its addresses. */
-static void identify(struct connection *connection)
+static size_t peer_of(GSocketAddress *address, unsigned char peer[16], bool *here)
 {
     static const guint8 mapped[12] = {[10] = 0xff, [11] = 0xff};
-    g_autoptr(GSocketAddress) address = g_socket_get_remote_address(connection->socket, NULL);
 
     if (!address || !G_IS_INET_SOCKET_ADDRESS(address))
-        return;
+        return 0;
     GInetAddress *inet = g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(address));
     const guint8 *bytes = g_inet_address_to_bytes(inet);
     gsize size = g_inet_address_get_native_size(inet);
-    connection->here = g_inet_address_get_is_loopback(inet);
+    *here = g_inet_address_get_is_loopback(inet);
     if (size == 16 && !memcmp(bytes, mapped, sizeof mapped)) {
         bytes += 12;
         size = 4;
-    } else if (size == 16 && !connection->here)
+        *here = bytes[0] == 127;
+    } else if (size == 16 && !*here)
         size = 8;
-    memcpy(connection->peer, bytes, size);
-    connection->peer_size = size;
+    memcpy(peer, bytes, size);
+    return size;
+}
+
+static void identify(struct connection *connection)
+{
+    g_autoptr(GSocketAddress) address = g_socket_get_remote_address(connection->socket, NULL);
+
+    connection->peer_size = peer_of(address, connection->peer, &connection->here);
+}
+
+size_t lumi_api_guard_peer(SoupServerMessage *message, unsigned char peer[16], bool *here)
+{
+    *here = false;
+    return peer_of(soup_server_message_get_remote_address(message), peer, here);
 }
 
 static bool is_same_peer(const struct connection *a, const struct connection *b)
@@ -112,7 +126,7 @@ static void refuse(const struct connection *connection)
 {
     g_autofree char *answer = lumi_api_problem_message(503, "limit", "too many connections are open already");
 
-    if (!connection->guard->http->https)
+    if (!connection->tls)
         g_socket_send_with_blocking(connection->socket, answer, strlen(answer), FALSE, NULL, NULL);
     g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
 }
@@ -148,7 +162,7 @@ static gboolean on_tick(void *context)
 
 static void set_limit(struct lumi_api_guard *guard, SoupServerMessage *message, int64_t until_ns, bool waiting)
 {
-    GSocket *socket = soup_server_message_get_socket(message);
+    GSocket *socket = lumi_api_socket(message);
     struct connection *connection = socket ? g_hash_table_lookup(guard->connections, socket) : NULL;
 
     if (connection) {
@@ -157,11 +171,28 @@ static void set_limit(struct lumi_api_guard *guard, SoupServerMessage *message, 
     }
 }
 
+static bool keep(struct lumi_api_guard *guard, GSocket *socket, bool tls)
+{
+    struct connection *made = g_new0(struct connection, 1);
+    bool good;
+
+    *made = (struct connection){.guard = guard, .socket = socket, .waiting = true, .tls = tls};
+    made->until_ns = now(guard) + REQUEST_NS;
+    identify(made);
+    g_hash_table_insert(guard->connections, socket, made);
+    g_object_weak_ref(G_OBJECT(socket), on_gone, guard);
+    good = !is_one_too_many(made);
+    if (!good)
+        refuse(made);
+    if (!guard->tick)
+        guard->tick = lumi_api_attach(g_timeout_source_new(TICK_MS), G_PRIORITY_DEFAULT, on_tick, guard);
+    return good;
+}
+
 static void on_started(SoupServer *server, SoupServerMessage *message, void *context)
 {
     struct lumi_api_guard *guard = context;
-    GSocket *socket = soup_server_message_get_socket(message);
-    struct connection *made;
+    GSocket *socket = lumi_api_socket(message);
 
     (void)server;
     if (!socket)
@@ -170,16 +201,12 @@ static void on_started(SoupServer *server, SoupServerMessage *message, void *con
         set_limit(guard, message, now(guard) + REQUEST_NS, true);
         return;
     }
-    made = g_new0(struct connection, 1);
-    *made = (struct connection){.guard = guard, .socket = socket, .waiting = true};
-    made->until_ns = now(guard) + REQUEST_NS;
-    identify(made);
-    g_hash_table_insert(guard->connections, socket, made);
-    g_object_weak_ref(G_OBJECT(socket), on_gone, guard);
-    if (is_one_too_many(made))
-        refuse(made);
-    if (!guard->tick)
-        guard->tick = lumi_api_attach(g_timeout_source_new(TICK_MS), G_PRIORITY_DEFAULT, on_tick, guard);
+    keep(guard, socket, guard->http->https);
+}
+
+bool lumi_api_guard_take(struct lumi_api_guard *guard, GSocket *socket)
+{
+    return keep(guard, socket, true);
 }
 
 static void on_read(SoupServer *server, SoupServerMessage *message, void *context)
@@ -201,6 +228,7 @@ static void on_finished(SoupServer *server, SoupServerMessage *message, void *co
 void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *message)
 {
     set_limit(guard, message, INT64_MAX, false);
+    lumi_api_people_stream(guard->http, message);
 }
 
 /* ---- listening goes on ---- */

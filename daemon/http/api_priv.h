@@ -15,6 +15,7 @@ struct lumi_api_events;
 struct lumi_api_guard;
 struct lumi_api_live;
 struct lumi_api_pictures;
+struct lumi_api_door;
 struct lumi_http {
     struct lumi_http_options options; /* its strings are copies */
     GMainContext *context;            /* of the server's thread */
@@ -26,6 +27,7 @@ struct lumi_http {
     SoupServer *server;
     struct lumi_api_worker *worker;
     struct lumi_api_guard *guard;
+    struct lumi_api_door *door;
     GPtrArray *refusals;
     struct lumi_api_live *live;
     struct lumi_api_pictures *pictures;
@@ -85,6 +87,32 @@ void lumi_api_serve_page(struct lumi_http *http, SoupServerMessage *message, con
 /* Name of each file of the page: "index.html"; NULL ends them. */
 const char *const *lumi_api_page_files(void);
 
+/* ---- who asks (api_door.c, api_people.c, api_access.c, api_secure.c) ---- */
+
+/* After the guard; it opens what the folder of access says. */
+int lumi_api_door_create(struct lumi_http *http, struct lumi_api_door **door, struct lumi_error *error);
+/* Its thread ends; then the letters are dropped, then the rest is destroyed. NULL is fine. */
+void lumi_api_door_close(struct lumi_api_door *door);
+void lumi_api_door_destroy(struct lumi_api_door *door);
+/* False: whoever asks may not, and is answered already. */
+bool lumi_api_admit(struct lumi_http *http, SoupServerMessage *message, const char *path, enum lumi_api_role role);
+/* The connection's, also where TLS stands between. NULL: it is closed. */
+GSocket *lumi_api_socket(SoupServerMessage *message);
+bool lumi_api_is_tls(const struct lumi_http *http, SoupServerMessage *message);
+/* The answer goes on until it is finished; it ends with the session. By lumi_api_guard_spare. */
+void lumi_api_people_stream(struct lumi_http *http, SoupServerMessage *message);
+/* Another whenever somebody has come or gone; "people", as whoever sent the message sees them. */
+uint64_t lumi_api_people_number(const struct lumi_http *http);
+void lumi_api_people_put(struct lumi_http *http, SoupServerMessage *message, JsonBuilder *builder);
+
+extern const struct lumi_api_field lumi_api_login_fields[], lumi_api_pair_fields[], lumi_api_revoke_fields[];
+void lumi_api_serve_session(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_people(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_login(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_logout(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_pair(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_revoke(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+
 /* ---- events (api_events.c) ---- */
 
 int lumi_api_events_create(struct lumi_http *http, struct lumi_api_events **events, struct lumi_error *error);
@@ -125,7 +153,11 @@ GBytes *lumi_api_picture_bytes(struct lumi_picture *picture);
 struct lumi_api_guard *lumi_api_guard_create(struct lumi_http *http);
 void lumi_api_guard_listeners(struct lumi_api_guard *guard);
 void lumi_api_guard_destroy(struct lumi_api_guard *guard);
-/* This answer may take as long as it likes. */
+/* A connection that was accepted elsewhere. False: it is one too many, and shut down. */
+bool lumi_api_guard_take(struct lumi_api_guard *guard, GSocket *socket);
+/* Bytes that stand for the peer of a message, an IPv6 one's network; returns how many. */
+size_t lumi_api_guard_peer(SoupServerMessage *message, unsigned char peer[16], bool *here);
+/* This answer may take as long as it likes: as long as the session lasts. */
 void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *message);
 
 /* ---- a request that is too large (api_refuse.c) ---- */

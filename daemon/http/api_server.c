@@ -1,9 +1,4 @@
-/* The API's server: who may ask, what is asked for, and life.
- *
- * A service on localhost is within reach of every page that a browser on this computer shows. So, where no token is
- * shown: the Host header must name this computer (a foreign name that was made to lead to 127.0.0.1 does not), and
- * always: a request that says it comes from another origin is refused, and a body must be JSON by its type, which no
- * form can send. */
+/* The API's server: what is asked for, and life. */
 #include "daemon/http/api_priv.h"
 
 #include <signal.h>
@@ -12,6 +7,8 @@
 #define BODY_MAX (1 << 20)
 #define CONNECTIONS_MAX 256
 #define CONNECTIONS_PEER 64
+#define SESSION_IDLE_NS (24 * 3600 * INT64_C(1000000000))
+#define SESSION_MOST_NS (14 * 86400 * INT64_C(1000000000))
 
 void lumi_http_options_init(struct lumi_http_options *options)
 {
@@ -20,52 +17,8 @@ void lumi_http_options_init(struct lumi_http_options *options)
     options->body_max = BODY_MAX;
     options->connections_max = CONNECTIONS_MAX;
     options->connections_peer = CONNECTIONS_PEER;
-}
-
-/* ---- who may ask ---- */
-
-static bool is_from_here(SoupServerMessage *message)
-{
-    GSocketAddress *address = soup_server_message_get_remote_address(message);
-
-    return address && G_IS_INET_SOCKET_ADDRESS(address) &&
-           g_inet_address_get_is_loopback(g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(address)));
-}
-
-/* NULL: no token, but none is needed either. */
-static const char *token_problem(struct lumi_http *http, SoupServerMessage *message, bool *shown)
-{
-    const char *given = soup_message_headers_get_one(soup_server_message_get_request_headers(message), "Authorization");
-
-    *shown = http->options.token && given && lumi_api_token_matches(given, http->options.token);
-    if (*shown || !http->options.token || (!given && !http->options.token_everywhere && is_from_here(message)))
-        return NULL;
-    return given ? "the token is wrong" : "a token is needed (Authorization: Bearer TOKEN)";
-}
-
-/* True: it is answered already. */
-static bool refused(struct lumi_http *http, SoupServerMessage *message)
-{
-    SoupMessageHeaders *headers = soup_server_message_get_request_headers(message);
-    const char *host = soup_message_headers_get_one(headers, "Host");
-    const char *origin = soup_message_headers_get_one(headers, "Origin");
-    const char *site = soup_message_headers_get_one(headers, "Sec-Fetch-Site");
-    bool shown;
-    const char *problem = token_problem(http, message, &shown);
-
-    if (problem) {
-        soup_message_headers_replace(soup_server_message_get_response_headers(message), "WWW-Authenticate",
-                                     "Bearer realm=\"lumid\"");
-        lumi_api_send_problem(message, 401, "token", problem);
-    } else if (!shown && !lumi_api_host_is_local(host))
-        lumi_api_send_problem(message, 421, "host",
-                              "without a token only localhost, 127.0.0.1 and [::1] are answered to");
-    else if ((origin && !lumi_api_origin_is_own(origin, http->https ? "https" : "http", host)) ||
-             (site && strcmp(site, "same-origin") && strcmp(site, "none")))
-        lumi_api_send_problem(message, 403, "origin", "requests of other sites' pages are not answered");
-    else
-        return false;
-    return true;
+    options->session_idle_ns = SESSION_IDLE_NS;
+    options->session_most_ns = SESSION_MOST_NS;
 }
 
 /* When the headers are here and nothing of the body is. */
@@ -214,25 +167,26 @@ static void on_request(SoupServer *server, SoupServerMessage *message, const cha
                        void *context)
 {
     struct lumi_http *http = context;
-    const char *method = soup_server_message_get_method(message);
+    const struct lumi_api_route *route = NULL;
     char part[LUMI_API_STRING_MAX + 1];
     bool known = false;
 
     (void)server;
     (void)query;
     lumi_api_harden(message);
-    if (refused(http, message))
-        return;
-    for (int i = 0; lumi_api_routes[i].path; i++) {
+    for (int i = 0; lumi_api_routes[i].path && !route; i++) {
         if (!lumi_api_path_match(lumi_api_routes[i].path, path, part))
             continue;
         known = true;
-        if (!strcmp(lumi_api_routes[i].method, method)) {
-            call(http, message, &lumi_api_routes[i], part);
-            return;
-        }
+        if (!strcmp(lumi_api_routes[i].method, soup_server_message_get_method(message)))
+            route = &lumi_api_routes[i];
     }
-    if (known)
+    /* What there is, too, is told to those only who may see it. */
+    if (!lumi_api_admit(http, message, path, route ? route->role : LUMI_API_WATCH))
+        return;
+    if (route)
+        call(http, message, route, part);
+    else if (known)
         answer_no_method(message, path);
     else
         lumi_api_send_problem(message, 404, "path", "there is nothing here; /openapi.json says what there is");
@@ -295,6 +249,9 @@ static void copy_options(struct lumi_http *http, const struct lumi_http_options 
     http->options.token = options->token && *options->token ? g_strdup(options->token) : NULL;
     http->options.certificate = g_strdup(options->certificate);
     http->options.key = g_strdup(options->key);
+    http->options.access = g_strdup(options->access);
+    http->options.secure = g_strdup(options->secure);
+    http->options.host_name = g_strdup(options->host_name);
     http->options.folder = g_strdup(options->folder);
 }
 
@@ -365,6 +322,7 @@ static int make_server(struct lumi_http *made, struct lumi_error *error)
     made->guard = lumi_api_guard_create(made);
     soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
     soup_server_add_handler(made->server, NULL, on_request, made, NULL);
+    LUMI_GOTO(code, out, lumi_api_door_create(made, &made->door, error));
     LUMI_GOTO(code, out, listen_at(made, error));
     lumi_api_guard_listeners(made->guard);
 out:
@@ -400,11 +358,13 @@ void lumi_http_stop(struct lumi_http *http)
         end_thread(http);
     g_main_context_push_thread_default(http->context);
     lumi_api_worker_destroy(http->worker);
+    lumi_api_door_close(http->door);
     lumi_api_post_destroy(http->to_engine);
     lumi_api_post_destroy(http->to_server);
     lumi_api_live_destroy(http->live);
     lumi_api_pictures_destroy(http->pictures);
     lumi_api_events_destroy(http->events);
+    lumi_api_door_destroy(http->door);
     lumi_api_guard_destroy(http->guard);
     lumi_api_refuse_finish(http);
     soup_server_disconnect(http->server);
@@ -420,6 +380,9 @@ void lumi_http_stop(struct lumi_http *http)
     g_free((char *)http->options.token);
     g_free((char *)http->options.certificate);
     g_free((char *)http->options.key);
+    g_free((char *)http->options.access);
+    g_free((char *)http->options.secure);
+    g_free((char *)http->options.host_name);
     g_free((char *)http->options.folder);
     g_free(http);
 }

@@ -16,16 +16,21 @@ struct lumi_http_options {
     const char *token;     /* asked of all but this computer; NULL: loopback addresses only */
     bool token_everywhere; /* asked of this computer too, which others may share */
     const char *certificate, *key; /* PEM files; NULL: plain HTTP. Both in one file where key is NULL */
-    const char *folder;            /* where captures are kept, for /api/v1/captures; may be NULL */
-    size_t body_max;               /* of a request (1 MiB) */
-    int connections_max;           /* of which connections_peer are kept for this computer (256) */
-    int connections_peer;          /* of one address, or IPv6 network of 64 bits (64) */
+    const char *access;    /* folder of users, sessions and the rig's certificate (docs/access.md); NULL: no users */
+    const char *secure;    /* as listen: open while there are users, with that certificate; NULL, "": never */
+    const char *host_name; /* for the certificate; NULL: this computer's */
+    int64_t session_idle_ns, session_most_ns; /* without use (24 hours); in all (14 days) */
+    const char *folder;                       /* where captures are kept, for /api/v1/captures; may be NULL */
+    size_t body_max;                          /* of a request (1 MiB) */
+    int connections_max;                      /* of which connections_peer are kept for this computer (256) */
+    int connections_peer;                     /* of one address, or IPv6 network of 64 bits (64) */
     struct lumi_engine *engine;
-    struct lumi_handover *handover;   /* may be NULL */
-    bool processes;                   /* the hand-over has a command to start */
-    struct lumi_ingest *ingest;       /* may be NULL */
-    struct lumi_pictures *pictures;   /* of the engine's cameras, in their order; may be NULL. Outlives the server */
-    int64_t (*now_ns)(void *context); /* in either thread */
+    struct lumi_handover *handover;    /* may be NULL */
+    bool processes;                    /* the hand-over has a command to start */
+    struct lumi_ingest *ingest;        /* may be NULL */
+    struct lumi_pictures *pictures;    /* of the engine's cameras, in their order; may be NULL. Outlives the server */
+    int64_t (*now_ns)(void *context);  /* in either thread */
+    int64_t (*unix_us)(void *context); /* likewise, the time of day; NULL: as now_ns, for tests */
     /* Straight to the board, in the server's thread; the engine is told later. False: the board is away, it is stopped
      * when it comes back. Never NULL. */
     bool (*emergency_stop)(void *context);

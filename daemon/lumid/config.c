@@ -276,8 +276,12 @@ static void check_listen(struct reader *reader)
 {
     const struct lumi_config *config = reader->config;
     const char *colon = strrchr(config->listen, ':');
+    const char *second = strrchr(config->secure, ':');
     char host[256] = "";
 
+    if (config->secure[0] && (!second || second == config->secure || !second[1] || strlen(second + 1) > 5 ||
+                              strspn(second + 1, "0123456789") != strlen(second + 1) || atoi(second + 1) > 65535))
+        wrong(reader, reader->http_line, "[http] secure: \"%.60s\" is no ADDRESS:PORT", config->secure);
     if (!colon || colon == config->listen || !colon[1] || strlen(colon + 1) > 5 ||
         strspn(colon + 1, "0123456789") != strlen(colon + 1) || atoi(colon + 1) > 65535) {
         wrong(reader, reader->http_line, "[http] listen: \"%.60s\" is no ADDRESS:PORT", config->listen);

@@ -25,6 +25,9 @@ struct lumi_config {
     char listen[256];
     char token_file[LUMI_CONFIG_PATH], certificate[LUMI_CONFIG_PATH], key[LUMI_CONFIG_PATH];
     size_t body_max;
+    char access[LUMI_CONFIG_PATH]; /* "": no users */
+    char secure[256];              /* "": never */
+    double session_idle, session_most;
     /* [process] */
     char command[LUMI_CONFIG_PATH];
     int process_parallel, process_retries;

@@ -147,6 +147,13 @@ const struct lumi_config_key lumi_config_keys[] = {
     TEXT("http", "certificate", PLACE, AT(certificate), "", "/etc/lumisphere/certificate.pem",
          "PEM; with it and key: TLS."),
     TEXT("http", "key", PLACE, AT(key), "", "/etc/lumisphere/key.pem", "PEM."),
+    TEXT("http", "access", PLACE, AT(access), "/var/lib/lumisphere/access", NULL,
+         "A folder for users (lumi user), their sessions and the rig's certificate, docs/access.md; empty: no users."),
+    TEXT("http", "secure", TEXT, AT(secure), "*:8471", NULL,
+         "Where others are answered, with TLS, as soon as there is a user: *:PORT, ADDRESS:PORT; empty: nowhere."),
+    REAL("http", "session_idle_s", AT(session_idle), 1, 31536000, "86400",
+         "How long somebody stays logged in without using it."),
+    REAL("http", "session_s", AT(session_most), 1, 31536000, "1209600", "How long somebody stays logged in at all."),
     BYTES("http", "body_max", AT(body_max), 1024, 1 << 30, "1M", "Largest request."),
     TEXT("process", "command", TEXT, AT(command), "", "lumi process %c -o %o",
          "Words and quotes as in a shell, without one: %c the capture, %n its name, %w its work folder, %o the field "

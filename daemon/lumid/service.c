@@ -302,6 +302,12 @@ static int64_t http_now(void *context)
     return lumi_service_now();
 }
 
+static int64_t http_unix_us(void *context)
+{
+    (void)context;
+    return (lumi_service_now() + lumi_service_utc_offset()) / 1000;
+}
+
 static bool http_emergency_stop(void *context)
 {
     struct lumi_service *service = context;
@@ -330,6 +336,11 @@ static int start_http(struct lumi_service *service, struct lumi_error *error)
     options.certificate = config->certificate[0] ? config->certificate : NULL;
     options.key = config->key[0] ? config->key : NULL;
     options.body_max = config->body_max;
+    options.access = config->access[0] ? config->access : NULL;
+    options.secure = config->secure;
+    options.session_idle_ns = (int64_t)(config->session_idle * 1e9);
+    options.session_most_ns = (int64_t)(config->session_most * 1e9);
+    options.unix_us = http_unix_us;
     options.folder = config->engine.folder;
     options.engine = service->engine;
     options.handover = service->handover;

@@ -77,8 +77,8 @@ static int write_configuration(const struct sim_rig_processes *rig, struct lumi_
         describe_drive(rig, text);
     g_string_append_printf(text,
                            "\n[capture]\nfolder = %s\nframe_patience_s = %g\n"
-                           "memory = 256M\n\n[http]\nlisten = localhost:%d\n",
-                           captures, rig->patience, rig->port);
+                           "memory = 256M\n\n[http]\nlisten = localhost:%d\nsecure = *:%d\naccess = %s/access\n",
+                           captures, rig->patience, rig->port, rig->port ? rig->port + 1 : 0, rig->folder);
     if (rig->process)
         g_string_append_printf(text, "\n[process]\ncommand = %s\n", rig->process);
     for (int i = 0; i < rig->rig.camera_count; i++)

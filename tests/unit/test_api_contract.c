@@ -179,7 +179,9 @@ static void assert_described(JsonObject *operation, unsigned status, const char 
 
     if (!json_object_has_member(json_object_get_object_member(operation, "responses"), word))
         fail_msg("%s answers %u, which is not described", path, status);
-    if (status >= 300 && !json_object_has_member(operation, "parameters"))
+    /* Nobody can log in where there is no user (test_api_access). */
+    if (status >= 300 && !json_object_has_member(operation, "parameters") &&
+        !g_str_has_prefix(path, "/api/v1/session/"))
         fail_msg("%s answers %u", path, status);
 }
 
