@@ -72,7 +72,7 @@ void lumi_api_live_picture(struct lumi_api_live *live, int camera)
 
 static void look_after(struct watcher *watcher)
 {
-    GSocket *socket = soup_server_message_get_socket(watcher->message);
+    GSocket *socket = lumi_api_socket(watcher->message);
 
     if (!socket ||
         (!lumi_api_has_hung_up(socket) && !(watcher->busy && now(watcher->live) - watcher->written_ns > PATIENCE_NS)))

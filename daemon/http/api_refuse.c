@@ -80,7 +80,7 @@ struct pending {
 static gboolean answer_now(void *context)
 {
     struct pending *pending = context;
-    GSocket *socket = soup_server_message_get_socket(pending->message);
+    GSocket *socket = lumi_api_socket(pending->message);
     struct refusal *refusal = g_new0(struct refusal, 1);
 
     refusal->http = pending->http;
