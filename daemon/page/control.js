@@ -176,27 +176,11 @@ function progress(bar, capture) {
     bar.setAttribute("aria-valuetext", t("fact.percent", { n: Math.floor(there * 100) }));
 }
 
-function faults(element) {
-    const names = store.get("rig")?.faults ?? [];
-    const lines = [];
-
-    if (store.get("estop"))
-        lines.push(t("fault.estop"));
-    if (names.length)
-        lines.push(t("fault.stand", { names: names.join(", ") }));
-    if (store.get("rig") && store.get("rig").link !== "open")
-        lines.push(t("fault.link", { text: store.get("rig").text || store.get("rig").link }));
-    element.hidden = !lines.length;
-    setText(element, lines.join(" "));
-}
-
 export function mount(root) {
     const buttons = actions.map((action) => button(action, "act"));
     const quick = actions.filter((one) => QUICK.includes(one.name)).map((action) => button(action, "quick"));
-    const text = h("p", { class: "text", test: "state-text", "aria-live": "polite" });
     const bar = h("progress", { max: 1, "aria-label": t("fact.progress"), test: "progress" });
     const numbers = h("dl", { class: "facts" });
-    const fault = h("p", { class: "notice", data: { kind: "bad" }, role: "status", test: "faults" });
     const more = h("button", { type: "button", class: "more", test: "control-more", "aria-expanded": "false",
         "aria-controls": "control-panel", on: { click: () => {
             more.setAttribute("aria-expanded", String(root.classList.toggle("open")));
@@ -204,11 +188,9 @@ export function mount(root) {
     const update = () => {
         const capture = store.get("capture");
 
-        setText(text, capture?.text ?? "");
         buttons.forEach((one) => one.update(false));
         quick.forEach((one) => one.update(true));
         progress(bar, capture);
-        faults(fault);
         facts(numbers);
     };
 
@@ -216,7 +198,7 @@ export function mount(root) {
     unfollow = store.on(["capture", "rig", "disk", "estop", "session", "connection"], update);
     notice = noticeBox();
     fill(root, h("div", { class: "quick" }, quick.map((one) => one.element), more),
-        h("div", { id: "control-panel", class: "stack" }, h("h2", {}, t("control")), text, bar, numbers, fault, notice.element,
+        h("div", { id: "control-panel", class: "stack" }, h("h2", {}, t("control")), bar, numbers, notice.element,
             h("div", { class: "acts" }, buttons.map((one) => one.element))));
     update();
 }

@@ -71,7 +71,7 @@ export function t(key, values = {}) {
     });
 }
 
-// Elements of index.html name their text: data-t="key", data-t-label="key" for aria-label.
+// Elements of index.html name their text in data-t, that of their aria-label in data-t-label.
 export function translate(root) {
     for (const element of root.querySelectorAll("[data-t]"))
         element.textContent = t(element.dataset.t);

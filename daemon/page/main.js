@@ -3,12 +3,12 @@ import { get } from "./api.js";
 import * as control from "./control.js";
 import { fill, h, setText } from "./dom.js";
 import { clock, loadTexts, onLanguage, t } from "./i18n.js";
-import { requireSession, startSession } from "./login.js";
+import { fetchSession, requireSession, startSession } from "./login.js";
 import { mountMenu } from "./menu.js";
 import { followState, refresh } from "./state.js";
 import { store } from "./store.js";
 import * as stream from "./stream.js";
-import { errorWords, stateWord } from "./words.js";
+import { errorWords, faultWord, stateWord } from "./words.js";
 
 import { view as captures } from "./view_captures.js";
 import { view as people } from "./view_people.js";
@@ -75,7 +75,25 @@ function showState() {
 
     state.dataset.state = capture?.state ?? "unknown";
     setText(state, capture ? stateWord(capture.state) : t("state.unknown"));
+    const text = document.getElementById("state-text");
+    setText(text, capture?.text ?? "");
+    text.hidden = !capture?.text;
     setText(document.getElementById("rig-name"), store.get("profile")?.name || store.get("rig")?.board || t("rig"));
+}
+
+function showFaults() {
+    const rig = store.get("rig");
+    const element = document.getElementById("faults");
+    const lines = [];
+
+    if (store.get("estop"))
+        lines.push(t("fault.pressed"));
+    if (rig?.faults?.length)
+        lines.push(t("fault.stand", { names: rig.faults.map(faultWord).join("; ") }));
+    if (rig && rig.link !== "open")
+        lines.push(t("fault.link", { text: rig.text || rig.link }));
+    element.hidden = !lines.length;
+    setText(element, lines.join(" "));
 }
 
 function showConnection() {
@@ -89,6 +107,7 @@ function showConnection() {
 
 function shell() {
     showState();
+    showFaults();
     showConnection();
     mountMenu(document.getElementById("menu"));
     control.mount(document.getElementById("control"));
@@ -101,10 +120,17 @@ async function start() {
         enter(shown);
     });
     store.on(["capture", "rig", "profile"], showState);
+    store.on(["rig", "estop"], showFaults);
     store.on("connection", showConnection);
+    // What sticks below the header wants to know how tall it is.
+    new ResizeObserver(([entry]) => document.documentElement.style.setProperty("--header",
+        `${Math.round(entry.borderBoxSize[0].blockSize)}px`)).observe(document.getElementById("header"));
     shell();
     followState();
-    stream.on("open", refresh);
+    stream.on("open", () => {
+        refresh();
+        fetchSession().catch(() => {}); // who was here may not be any more
+    });
     await startSession();
     route({ focus: false });
     addEventListener("hashchange", () => route());

@@ -56,7 +56,8 @@ export function mountMenu(root) {
             (value) => {
                 kept.set("theme", value);
                 applyTheme();
-            })));
+            }),
+        h("p", { class: "why" }, `${t("estop.button")}: ${t("estop.help")}`)));
     const show = (session) => {
         who.textContent = name(session);
         fill(mine, account(session));

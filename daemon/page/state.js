@@ -11,7 +11,7 @@ let again = false;
 let soon = null;
 
 async function ask() {
-    const status = await get("/api/v1/status", { quiet: true });
+    const status = await get("/api/v1/status");
 
     store.set("status", status);
     store.set("estop", status.estop);

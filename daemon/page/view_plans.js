@@ -10,21 +10,21 @@ const TYPED_MS = 400;
 
 // Keys of docs/rig-plan.md; `mode`: only in this one.
 const FIELDS = [
-    { key: "name", type: "text", maxlength: 31 },
+    { key: "name", maxlength: 31 },
     { key: "mode", options: ["", "continuous", "start-stop", "video"] },
-    { key: "turns", type: "number", min: 1, step: 1 },
-    { key: "first_turn", type: "number", min: 0, step: 1 },
-    { key: "positions", type: "number", min: 1, max: 4096, step: 1 },
-    { key: "turn_time_s", type: "number", min: 0, step: "any" },
-    { key: "position_time_s", type: "number", min: 0, step: "any", mode: "start-stop" },
-    { key: "settle_s", type: "number", min: 0, step: "any", mode: "start-stop" },
-    { key: "exposure_s", type: "text" },
-    { key: "stops", type: "text", mode: "start-stop" },
-    { key: "exposures_s", type: "text" },
-    { key: "bracket_gap_s", type: "number", min: 0, step: "any", mode: "start-stop" },
+    { key: "turns", inputmode: "numeric" },
+    { key: "first_turn", inputmode: "numeric" },
+    { key: "positions", inputmode: "numeric" },
+    { key: "turn_time_s", inputmode: "decimal" },
+    { key: "position_time_s", inputmode: "decimal", mode: "start-stop" },
+    { key: "settle_s", mode: "start-stop" },
+    { key: "exposure_s" },
+    { key: "stops", mode: "start-stop" },
+    { key: "exposures_s" },
+    { key: "bracket_gap_s", inputmode: "decimal", mode: "start-stop" },
     { key: "wind", options: ["", "plan", "full", "none"] },
-    { key: "blur_max_px", type: "number", min: 0, step: "any" },
-    { key: "cameras", type: "text" },
+    { key: "blur_max_px", inputmode: "decimal" },
+    { key: "cameras" },
 ];
 
 let parts = null;
@@ -39,8 +39,8 @@ function input(field) {
     const element = field.options
         ? h("select", attributes, field.options.map((one) => h("option", { value: one },
             one ? t(`plan.${field.key}.${one}`) : t("plan.default"))))
-        : h("input", { ...attributes, type: field.type, min: field.min, max: field.max, step: field.step,
-            maxlength: field.maxlength, autocomplete: "off", placeholder: t("plan.default"), spellcheck: "false" });
+        : h("input", { ...attributes, inputmode: field.inputmode, maxlength: field.maxlength, autocomplete: "off",
+            placeholder: t("plan.default"), spellcheck: "false" });
 
     return { field, element, row: h("div", { class: "field" }, h("label", { for: id }, t(`plan.${field.key}`)), element, help) };
 }

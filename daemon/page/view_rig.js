@@ -14,6 +14,7 @@ const FIRM = ["link", "versions", "profile", "plan", "drive"];
 
 const overridden = new Set();
 let parts = null;
+let starting = false; // asked for here: when it turns, the sweep is what one wants to see
 let unfollow = null;
 
 const capture = () => store.get("capture");
@@ -105,10 +106,23 @@ function showChecks() {
         parts.list.querySelector(`[data-name="${CSS.escape(focused)}"] input`)?.focus();
 }
 
+function followStart() {
+    const state = capture()?.state;
+
+    if (starting && ["homing", "arming", "sweeping"].includes(state)) {
+        starting = false;
+        location.hash = "#sweep";
+    } else if (starting && state === "red") {
+        starting = false;
+        parts.notice.say("bad", t("why.red", { n: openReds().length, names: openReds().map((one) => checkTitle(one.name)).join(", ") }));
+    }
+}
+
 function update() {
     const noCheck = whyNoCheck();
     const noStart = whyNoStart();
 
+    followStart();
     showChecks();
     setText(parts.summary, summary());
     parts.run.disabled = noCheck !== "";
@@ -162,8 +176,8 @@ async function start() {
     try {
         await post("/api/v1/capture/start", { plan: plan.text, ...(title ? { title } : {}),
             ...(names.length ? { override: names } : {}) }, { moves: true });
-        overridden.clear();
-        location.hash = "#sweep";
+        starting = true;
+        parts?.notice.say("info", t("rig.started"));
     } catch (error) {
         parts?.notice.error(error);
         if (error.word === "busy")

@@ -8,6 +8,10 @@ export function stateWord(state) {
     return has(`state.${state}`) ? t(`state.${state}`) : state;
 }
 
+export function faultWord(name) {
+    return has(`fault.${name}`) ? t(`fault.${name}`) : name;
+}
+
 // "trigger c03" is the check "trigger" of the camera c03; "disk speed" is one of its own.
 function family(name) {
     if (has(`check.${name}`))
@@ -39,7 +43,7 @@ export function errorWords(error) {
     const key = has(`error.${error.word}`) ? `error.${error.word}` : error.status >= 500 ? "error.internal" : "";
 
     if (!key)
-        return error.detail ? t("error.other", { detail: error.detail }) : t("error.unknown");
+        return error.detail ? t("error.refused", { detail: error.detail }) : t("error.unknown");
     return t(key, { detail: error.detail ?? "" });
 }
 

@@ -14,6 +14,7 @@ lumi_house(layers ${here}/layers.sh ${PROJECT_SOURCE_DIR} ${here}/layers.txt)
 lumi_house(layers_seen ${here}/layers_test.sh ${here})
 lumi_house(text ${here}/text.sh ${PROJECT_SOURCE_DIR} ${here}/bounds.txt)
 lumi_house(format ${here}/format.sh ${PROJECT_SOURCE_DIR})
+lumi_house(page ${here}/page.sh ${PROJECT_SOURCE_DIR}/daemon/page)
 
 # Every header alone, with the include folders of the libraries that the program uses, and which Embree it is.
 set(flags "$<TARGET_PROPERTY:lumi,INCLUDE_DIRECTORIES>;$<TARGET_PROPERTY:lumi_camera,INCLUDE_DIRECTORIES>")
