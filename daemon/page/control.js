@@ -7,7 +7,7 @@ import { bytes, duration, number, t } from "./i18n.js";
 import { peopleNow } from "./people.js";
 import { mayOperate, store } from "./store.js";
 import { refresh } from "./state.js";
-import { noticeBox, stateWord } from "./words.js";
+import { noticeBox, saidWords, stateWord } from "./words.js";
 
 export const RESTING = ["idle", "red", "done", "failed"];
 const WAITING = ["paused", "interrupted"];
@@ -71,7 +71,7 @@ function pause() {
 }
 
 async function resume() {
-    if (await askMove(t("control.resume.ask"), h("p", {}, store.get("capture")?.text ?? ""), t("control.resume")))
+    if (await askMove(t("control.resume.ask"), h("p", {}, saidWords(store.get("capture")?.text)), t("control.resume")))
         await send("resume", {}, { moves: true });
 }
 
@@ -185,9 +185,13 @@ export function mount(root) {
         "aria-controls": "control-panel", on: { click: () => {
             more.setAttribute("aria-expanded", String(root.classList.toggle("open")));
         } } }, t("control.more"));
+    let seen = state();
     const update = () => {
         const capture = store.get("capture");
 
+        if (state() !== seen)
+            notice.age();
+        seen = state();
         buttons.forEach((one) => one.update(false));
         quick.forEach((one) => one.update(true));
         progress(bar, capture);

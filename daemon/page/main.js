@@ -8,7 +8,7 @@ import { mountMenu } from "./menu.js";
 import { followState, refresh } from "./state.js";
 import { store } from "./store.js";
 import * as stream from "./stream.js";
-import { errorWords, faultWord, stateWord } from "./words.js";
+import { errorWords, faultWord, saidWords, stateWord } from "./words.js";
 
 import { view as captures } from "./view_captures.js";
 import { view as people } from "./view_people.js";
@@ -76,7 +76,7 @@ function showState() {
     state.dataset.state = capture?.state ?? "unknown";
     setText(state, capture ? stateWord(capture.state) : t("state.unknown"));
     const text = document.getElementById("state-text");
-    setText(text, capture?.text ?? "");
+    setText(text, saidWords(capture?.text));
     text.hidden = !capture?.text;
     setText(document.getElementById("rig-name"), store.get("profile")?.name || store.get("rig")?.board || t("rig"));
 }

@@ -15,6 +15,7 @@ const FIRM = ["link", "versions", "profile", "plan", "drive"];
 const overridden = new Set();
 let parts = null;
 let starting = false; // asked for here: when it turns, the sweep is what one wants to see
+let seen = null; // the state at the last look
 let unfollow = null;
 
 const capture = () => store.get("capture");
@@ -123,6 +124,9 @@ function update() {
     const noStart = whyNoStart();
 
     followStart();
+    if (capture()?.state !== seen)
+        parts.notice.age();
+    seen = capture()?.state;
     showChecks();
     setText(parts.summary, summary());
     parts.run.disabled = noCheck !== "";
@@ -213,7 +217,7 @@ export const view = {
             summary: h("p", { role: "status", test: "preflight-summary" }),
             list: h("ul", { class: "checks" }),
         };
-        fill(root, h("h1", {}, t("nav.rig")),
+        fill(root, h("h1", {}, t("rig.heading")),
             h("section", { class: "panel stack" },
                 h("div", { class: "field" }, h("label", { for: "plan-select" }, t("rig.plan")), parts.choose),
                 parts.facts,

@@ -2,10 +2,19 @@
 import { has, t } from "./i18n.js";
 import { h } from "./dom.js";
 
+const NOTICE_MS = 5000;
+
 export const ICONS = { green: "✔", yellow: "!", red: "✖", undecided: "…" };
 
 export function stateWord(state) {
     return has(`state.${state}`) ? t(`state.${state}`) : state;
+}
+
+// What the engine says of its state, where that is one of its fixed sentences; others are shown as they are.
+export function saidWords(text) {
+    const key = `said.${String(text ?? "").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "")}`;
+
+    return has(key) ? t(key) : text ?? "";
 }
 
 export function faultWord(name) {
@@ -51,9 +60,17 @@ export function errorWords(error) {
 export function noticeBox(test = "notice") {
     const element = h("p", { class: "notice", role: "status", test, hidden: true });
 
+    let since = 0;
+
     return {
         element,
+        // What was said of something that has passed goes: called when the state of the rig has changed.
+        age() {
+            if (Date.now() - since > NOTICE_MS)
+                this.clear();
+        },
         say(kind, text, ...more) {
+            since = Date.now();
             element.hidden = false;
             element.dataset.kind = kind;
             element.replaceChildren(kind === "bad" ? `${ICONS.red} ` : kind === "good" ? `${ICONS.green} ` : "", text,

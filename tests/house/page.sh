@@ -26,12 +26,15 @@ done
 for file in texts.*.json; do
     diff "$work/texts.en.json" "$work/$file" >"$work/differ" || say "$file against texts.en.json: $(cat "$work/differ")"
 done
-cut -d' ' -f1 "$work/texts.en.json" | sed 's/\.\(one\|other\)$//' | sort -u >"$work/keys"
+# A text with forms for one and for several is named without them.
+cut -d' ' -f1 "$work/texts.en.json" | sort -u >"$work/each"
+sed 's/\.\(one\|other\)$//' "$work/each" | sort -u >"$work/keys"
+sort -u "$work/each" "$work/keys" >"$work/either"
 
 # t("key") and data-t="key"; of t(`begin.${…}.end`) the beginning has to be there, whatever the middle is.
 cat ./*.js index.html | grep -oE "([^a-zA-Z_.]t\(\"[^\"]+\"|data-t(-label)?=\"[^\"]+\")" | sed 's/^[^"]*"//; s/"$//' |
     sort -u >"$work/named"
-missing=$(comm -23 "$work/named" "$work/keys")
+missing=$(comm -23 "$work/named" "$work/either")
 [ -z "$missing" ] || say "no text for: $missing"
 cat ./*.js | grep -oE "[^a-zA-Z_.]t\(\`[^\`]+\`" | sed 's/^[^`]*`//; s/`$//; s/\$.*//' | sort -u | while read -r begin; do
     [ -z "$begin" ] || grep -qF "$begin" "$work/keys" || echo "$begin"
@@ -41,7 +44,7 @@ done >"$work/begins"
 # What is named by nothing is no text of the page. Beginnings that are put together stand in the scripts as `begin.
 grep -ohE "[\`\"][a-zA-Z]+(\.[a-zA-Z]+)*[.\"\`]" ./*.js index.html | tr -d "\`\"" | sort -u >"$work/words"
 while read -r key; do
-    grep -qxF "$key" "$work/words" "$work/named" && continue
+    grep -qxF -e "$key" -e "$key.other" "$work/words" "$work/named" && continue
     stem=$key
     while [ "$stem" != "${stem%.*}" ]; do
         stem=${stem%.*}
