@@ -56,7 +56,7 @@ export class CaptureCard {
         this.processed = progress("capture-processed");
         this.buttons = { verify: button("verify", verify), process: button("process", handOver), retake: button("retake", retakeMissing),
             delete: button("delete", deleteCapture) };
-        this.buttons.delete.classList.add("danger");
+        this.buttons.delete.classList.add("caution");
         this.download = h("a", { class: "button", test: "capture-download", download: `${name}.tar`, "aria-describedby": id,
             href: `/api/v1/captures/${encodeURIComponent(name)}/bundle.tar` }, t("capture.download"));
         this.why = h("p", { class: "why" });

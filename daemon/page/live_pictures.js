@@ -5,6 +5,7 @@ import { onPictures, pictures } from "./camera_pictures.js";
 import { h, setText } from "./dom.js";
 import { t } from "./i18n.js";
 import { store } from "./store.js";
+import { insertByName } from "./sweep_cameras.js";
 import { percent } from "./words_live.js";
 
 const PHONE = "(max-width: 700px)";
@@ -98,7 +99,7 @@ class Tiles {
                 continue;
             const tile = new Tile(name, (one) => this.toggle(one));
             this.tiles.set(name, tile);
-            this.list.append(tile.element);
+            insertByName(this.list, tile.element);
             this.seen.observe(tile.element);
             if (this.tiles.size === 1)
                 this.toggle(tile); // the first moves without being asked

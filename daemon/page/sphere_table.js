@@ -79,7 +79,7 @@ class BadList {
         this.rows = new Map();
         this.list = h("ul", { class: "bad-list" });
         this.said = h("p", {});
-        this.element = h("section", { class: "bad" }, h("h3", {}, t("bad.title")), this.said, this.list);
+        this.element = h("div", { class: "bad" }, h("h2", {}, t("bad.title")), this.said, this.list);
     }
 
     update() {
@@ -143,7 +143,7 @@ export function sphereTable(chose) {
     const grid = new Grid(chose), bad = new BadList(chose);
     const fold = h("details", { class: "sphere-words", test: "sphere-words", on: { toggle: () => write() } },
         h("summary", {}, t("table.summary")), grid.element);
-    const element = h("div", {}, bad.element, fold);
+    const element = h("section", { class: "sphere-said panel" }, bad.element, fold);
     let late = 0, built = null;
 
     const write = () => {

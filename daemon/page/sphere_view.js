@@ -68,7 +68,7 @@ class Stage {
     }
 
     recolour() {
-        this.renderer.setColours(colours(this.element));
+        this.renderer.setColours(colours(document.documentElement));
         this.redraw();
     }
 
@@ -186,7 +186,7 @@ function note(stage) {
     return stage.renderer.mode === "canvas" ? t(`sphere.canvas.${stage.why}`) : "";
 }
 
-// {element, destroy}
+// {element, words, destroy}; `words`: the same without a picture.
 export function sphereView() {
     const choosing = { on: false };
     let root = null;
@@ -210,14 +210,14 @@ export function sphereView() {
     stage.chose = () => show("chosen");
     root = h("section", { class: "sphere", test: "sphere", "aria-label": t("sphere.title") },
         stage.element, h("p", { class: "hint", id: stage.hint }, t("sphere.hint")), tools(stage, choosing), said, key.element,
-        retake.element, table.element);
+        retake.element);
     const theme = new MutationObserver(() => stage.recolour());
     theme.observe(document.documentElement, { attributes: true });
     const bright = matchMedia("(prefers-color-scheme: light)"), recolour = () => stage.recolour();
     bright.addEventListener("change", recolour);
     const off = onFrames(show);
     show("frames");
-    return { element: root, destroy() {
+    return { element: root, words: table.element, destroy() {
         off();
         theme.disconnect();
         bright.removeEventListener("change", recolour);

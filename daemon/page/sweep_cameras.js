@@ -68,6 +68,13 @@ class Card {
     }
 }
 
+// By name: c2 before c10, whichever was heard of first.
+export function insertByName(list, element) {
+    const after = [...list.children].find((other) => other.dataset.name.localeCompare(element.dataset.name, "en", { numeric: true }) > 0);
+
+    list.insertBefore(element, after ?? null);
+}
+
 // {element, destroy}
 export function sweepCameras() {
     const queue = new ImageQueue(), cards = new Map(), list = h("div", { class: "cameras" });
@@ -83,7 +90,7 @@ export function sweepCameras() {
         for (const name of new Set([...status.map((one) => one.name), ...pictures.cameras.keys()])) {
             if (!cards.has(name)) {
                 cards.set(name, new Card(name, seen));
-                list.append(cards.get(name).element);
+                insertByName(list, cards.get(name).element);
             }
             cards.get(name).count(status.find((one) => one.name === name));
         }

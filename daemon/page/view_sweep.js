@@ -16,7 +16,8 @@ export const view = {
 
         parts = [sphere, progress, cameras, events];
         root.append(h("h1", { class: "hidden" }, t("nav.sweep")), h("div", { class: "sweep" },
-            h("div", { class: "sweep-left" }, sphere.element), h("div", { class: "sweep-right" }, progress.element, events.element),
+            h("div", { class: "sweep-left" }, sphere.element),
+            h("div", { class: "sweep-right" }, progress.element, sphere.words, events.element),
             h("div", { class: "sweep-below" }, cameras.element)));
     },
 
