@@ -5,8 +5,8 @@ import * as stream from "./stream.js";
 
 const AT_ONCE = 2; // of the browser's six connections to lumid
 
-// name → {there, live, last}; `absent`: this lumid has no pictures.
-export const pictures = { cameras: new Map(), absent: false, error: null };
+// name → {there, live, last}; `fetched`: all of them are known; `absent`: this lumid has no pictures.
+export const pictures = { cameras: new Map(), fetched: false, absent: false, error: null };
 const listeners = new Set();
 let started = false;
 
@@ -15,6 +15,7 @@ async function fetchCameras() {
         const found = await get("/api/v1/cameras", { quiet: true });
         pictures.cameras = new Map(found.cameras.map((camera) => [camera.name, camera]));
         pictures.absent = false;
+        pictures.fetched = true;
         pictures.error = null;
     } catch (error) {
         pictures.absent = error.word === "absent";

@@ -5,7 +5,7 @@ import { onPictures, pictures } from "./camera_pictures.js";
 import { h, setText } from "./dom.js";
 import { t } from "./i18n.js";
 import { store } from "./store.js";
-import { insertByName } from "./sweep_cameras.js";
+import { byName, insertByName } from "./sweep_cameras.js";
 import { percent } from "./words_live.js";
 
 const PHONE = "(max-width: 700px)";
@@ -66,7 +66,7 @@ class Tile {
         this.image.alt = t(this.wanted ? "live.alt" : "live.alt.last", { name: this.name });
         setText(this.none, pictures.absent ? t("camera.absent") : camera && !camera.there ? t("live.away")
             : this.failed ? t("live.failed") : this.wanted ? t("live.waiting") : t("camera.noPicture"));
-        setText(this.figures, last ? t("live.figures", { sharpness: percent(last.sharpness, 0) }) : "");
+        setText(this.figures, Number.isFinite(last?.sharpness) ? t("live.figures", { sharpness: percent(last.sharpness, 0) }) : "");
     }
 }
 
@@ -94,16 +94,16 @@ class Tiles {
     }
 
     fill() {
-        for (const name of pictures.cameras.keys()) {
+        for (const name of [...pictures.cameras.keys()].sort(byName)) {
             if (this.tiles.has(name))
                 continue;
             const tile = new Tile(name, (one) => this.toggle(one));
             this.tiles.set(name, tile);
             insertByName(this.list, tile.element);
             this.seen.observe(tile.element);
-            if (this.tiles.size === 1)
-                this.toggle(tile); // the first moves without being asked
         }
+        if (pictures.fetched && !this.order && this.tiles.size)
+            this.toggle(this.tiles.get(this.list.firstChild.dataset.name)); // the first moves without being asked
         this.update();
     }
 

@@ -42,7 +42,7 @@ class Card {
             setText(this.none, pictures.absent ? t("camera.absent") : t("camera.noPicture"));
             return;
         }
-        setText(this.sharpness, percent(last.sharpness, 0));
+        setText(this.sharpness, Number.isFinite(last.sharpness) ? percent(last.sharpness, 0) : "–");
         setText(this.low, percent(last.clipped_low));
         setText(this.high, percent(last.clipped_high));
         this.high.parentElement.classList.toggle("much", last.clipped_high > CLIPPED_MUCH);
@@ -68,9 +68,13 @@ class Card {
     }
 }
 
-// By name: c2 before c10, whichever was heard of first.
+// c2 before c10.
+export function byName(a, b) {
+    return a.localeCompare(b, "en", { numeric: true });
+}
+
 export function insertByName(list, element) {
-    const after = [...list.children].find((other) => other.dataset.name.localeCompare(element.dataset.name, "en", { numeric: true }) > 0);
+    const after = [...list.children].find((other) => byName(other.dataset.name, element.dataset.name) > 0);
 
     list.insertBefore(element, after ?? null);
 }
