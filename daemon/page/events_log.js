@@ -1,8 +1,9 @@
 // What happened, for people: of all events those that somebody would want to read, the newest first, also after the page was
 // loaded anew. Thousands of frames that went well are told by the sphere, not here.
 import { t } from "./i18n.js";
+import { KINDS } from "./sphere.js";
 import * as stream from "./stream.js";
-import { checkTitle, stateWord } from "./words.js";
+import { checkTitle, saidWords, stateWord } from "./words.js";
 
 export const KEPT = 200;
 const KEY = "lumid.events";
@@ -40,6 +41,8 @@ function level(kind, data) {
         return data.verdict === "red" && !data.overridden ? "bad" : data.verdict === "yellow" ? "warn" : null;
     case "shot":
         return data.lost ? "warn" : null;
+    case "frame": // one that does not come is told as an incident too
+        return ["f", "c", "r"].includes(data.letter ?? (data.state === "rejected" ? "r" : "")) ? "warn" : null;
     case "incident":
         return "warn";
     case "sealed":
@@ -59,16 +62,19 @@ function level(kind, data) {
     }
 }
 
+const kindOf = (letter) => KINDS.find((kind) => kind.letter === letter)?.name ?? "rejected";
 const last = (path) => String(path ?? "").split("/").filter(Boolean).pop() ?? "";
 
 export function entryWords({ kind, data }) {
     switch (kind) {
     case "state":
-        return t(data.text ? "event.state.text" : "event.state", { state: stateWord(data.state), text: data.text ?? "" });
+        return t(data.text ? "event.state.text" : "event.state", { state: stateWord(data.state), text: saidWords(data.text) });
     case "check":
         return t("event.check", { check: checkTitle(data.name), reason: data.reason });
     case "shot":
         return t("event.shot.lost", { shot: String(data.shot) });
+    case "frame":
+        return t("event.frame", { shot: String(data.shot), camera: data.camera, kind: t(`kind.${kindOf(data.letter)}`), text: data.text ?? "" });
     case "incident":
         return data.camera ? t("event.incident.camera", { camera: data.camera, text: data.text }) : data.text;
     case "sealed":

@@ -2,7 +2,7 @@
 import { h, setText } from "./dom.js";
 import { bytes, number, t } from "./i18n.js";
 import { store } from "./store.js";
-import { stateWord } from "./words.js";
+import { saidWords, stateWord } from "./words.js";
 import { aboutTime } from "./words_live.js";
 
 const AT_WORK = ["homing", "arming", "sweeping", "pausing", "paused", "interrupted", "draining"];
@@ -63,7 +63,7 @@ export function sweepProgress() {
         const words = capture.frames ? t("progress.frames", { good, all: capture.frames, bad, stored }) : t("progress.none");
         line.set([good, stored, bad], capture.frames ?? 0, words);
         setText(said, words);
-        setText(text, capture.text ? t("progress.state", { state: stateWord(capture.state), text: capture.text }) : stateWord(capture.state));
+        setText(text, capture.text ? t("progress.state", { state: stateWord(capture.state), text: saidWords(capture.text) }) : stateWord(capture.state));
         round.set(capture.frames ? capture.round > 0 ? t("progress.retake", { n: capture.round }) : t("progress.sweep") : "–");
         time.set(AT_WORK.includes(capture.state) ? aboutTime(capture.seconds_left) : "–");
         shots.set(capture.shots ? t("progress.of", { done: capture.fired, all: capture.shots }) : "–",
