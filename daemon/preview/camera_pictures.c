@@ -284,9 +284,11 @@ static void make_all(struct lumi_pictures *pictures)
     }
 }
 
-void lumi_pictures_work(struct lumi_pictures *pictures)
+void lumi_pictures_work(struct lumi_pictures *pictures, bool make)
 {
     copy_all(pictures);
+    if (!make)
+        return;
     make_all(pictures);
     copy_all(pictures);
 }

@@ -1,0 +1,1 @@
+lumi_test(test_camera_pictures FOLDERS preview camera image base LABELS threads)
