@@ -53,10 +53,10 @@ void engine_picture(struct lumi_engine *e, int shot, int camera, struct lumi_cam
 
 /* ---- looking ---- */
 
-static bool by_software(const struct lumi_engine *e, int camera)
+static bool by_board(const struct lumi_engine *e, int camera)
 {
-    return e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_SOFTWARE ||
-           e->cameras[camera].identity.software_trigger;
+    return e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_HARDWARE &&
+           !e->cameras[camera].identity.software_trigger;
 }
 
 /* The plan's, where there was one; otherwise the camera's own choice. */
@@ -65,35 +65,34 @@ static double look_exposure(const struct lumi_engine *e)
     return e->plan_known ? e->plan.exposures[0] : 0;
 }
 
-static int fire_by_board(struct lumi_engine *e, int camera, struct lumi_error *error)
+static int check_board(const struct lumi_engine *e, int camera, struct lumi_error *error)
 {
-    lumi_wire_Request request = {.which_command = lumi_wire_Request_test_triggers_tag};
-    const struct engine_camera *c = e->cameras + camera;
-
-    if (!e->rig_known || c->rig < 0 || !e->plan_known)
+    if (!e->rig_known || e->cameras[camera].rig < 0 || !e->plan_known)
         return lumi_fail(error, LUMI_ERR_UNSUPPORTED,
                          "camera %s is fired by the board alone: it shows pictures after the first preflight",
                          e->config.cameras[camera].name);
     if (!e->connected || e->look || e->home_wanted || e->estop || e->faults || !engine_board_rests(e))
         return lumi_fail(error, LUMI_ERR_BUSY, "the board cannot fire camera %s now", e->config.cameras[camera].name);
-    request.command.test_triggers.cameras = 1u << c->rig;
-    request.command.test_triggers.exposure = e->plan.exposures[0];
-    e->look = ++e->next_number;
-    e->ports.rig_request(e->ports.context, e->look, &request);
     return LUMI_OK;
 }
 
-static int fire(struct lumi_engine *e, int camera, struct lumi_error *error)
+static void fire(struct lumi_engine *e, int camera)
 {
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_test_triggers_tag};
     struct engine_camera *c = e->cameras + camera;
+    struct lumi_error error;
 
     c->look_ns = e->now + LOOK_NS;
     if (e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_FREE)
-        return LUMI_OK;
-    if (!by_software(e, camera))
-        return fire_by_board(e, camera, error);
-    engine_camera_do(e, camera, LUMI_CAMERA_TRIGGER, look_exposure(e));
-    return LUMI_OK;
+        return;
+    if (!by_board(e, camera)) {
+        engine_camera_do(e, camera, LUMI_CAMERA_TRIGGER, look_exposure(e));
+    } else if (check_board(e, camera, &error) == LUMI_OK) {
+        request.command.test_triggers.cameras = 1u << c->rig;
+        request.command.test_triggers.exposure = e->plan.exposures[0];
+        e->look = ++e->next_number;
+        e->ports.rig_request(e->ports.context, e->look, &request);
+    }
 }
 
 int lumi_engine_look(struct lumi_engine *e, int64_t now_ns, int camera, struct lumi_error *error)
@@ -113,6 +112,8 @@ int lumi_engine_look(struct lumi_engine *e, int64_t now_ns, int camera, struct l
                          e->config.cameras[camera].name);
     if (e->now < c->look_ns || (c->looking && c->command))
         return LUMI_OK;
+    if (by_board(e, camera))
+        LUMI_TRY(check_board(e, camera, error));
     if (!c->looking) { /* as a capture wants it or not at all: it is set up anew */
         c->looking = true;
         c->configured = c->armed = c->trusted = false;
@@ -122,7 +123,7 @@ int lumi_engine_look(struct lumi_engine *e, int64_t now_ns, int camera, struct l
     else if (!c->armed)
         engine_camera_do(e, camera, LUMI_CAMERA_ARM, look_exposure(e));
     else
-        return fire(e, camera, error);
+        fire(e, camera);
     return LUMI_OK;
 }
 
@@ -130,7 +131,6 @@ int lumi_engine_look(struct lumi_engine *e, int64_t now_ns, int camera, struct l
 void engine_look_done(struct lumi_engine *e, int camera)
 {
     struct engine_camera *c = e->cameras + camera;
-    struct lumi_error error;
 
     if (!c->looking || c->command)
         return;
@@ -140,7 +140,7 @@ void engine_look_done(struct lumi_engine *e, int camera)
     } else if (c->command_kind == LUMI_CAMERA_CONFIGURE) {
         engine_camera_do(e, camera, LUMI_CAMERA_ARM, look_exposure(e));
     } else if (c->command_kind == LUMI_CAMERA_ARM) {
-        fire(e, camera, &error);
+        fire(e, camera);
     }
 }
 

@@ -57,7 +57,8 @@ struct lumi_picture_offer {
 bool lumi_pictures_offer(struct lumi_pictures *pictures, int64_t now_ns, const struct lumi_picture_offer *offer);
 /* What the judge has found, before or after the picture is there. */
 void lumi_pictures_sharpness(struct lumi_pictures *pictures, int camera, int shot, double sharpness);
-/* synchronous: copies the frames that wait, and makes pictures of the copies, or leaves those as a busy machine does. */
+/* synchronous: copies the frames that wait, and makes pictures of the copies, or leaves those as a busy machine does.
+ */
 void lumi_pictures_work(struct lumi_pictures *pictures, bool make);
 
 /* ---- pictures, from any thread ---- */

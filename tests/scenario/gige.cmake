@@ -14,6 +14,13 @@ if(TARGET lumid)
   endforeach()
   set_tests_properties(sim_rig_faults_test PROPERTIES LABELS slow)
   lumi_sanitized(sim_rig_drive_test)
+  # What the cameras see, while nothing is under way and in a sweep.
+  add_executable(watch_pictures watch_pictures.c)
+  target_link_libraries(watch_pictures PRIVATE lumi_flags lumi_image lumi_base PkgConfig::libsoup_3_0)
+  add_test(NAME rig_pictures_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/rig_pictures_test.sh $<TARGET_FILE:lumi>
+    $<TARGET_FILE:lumid> $<TARGET_FILE:watch_pictures>)
+  set_tests_properties(rig_pictures_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
+  lumi_sanitized(rig_pictures_test)
   # The daemon killed in the middle of its work; a hundred times only in `script/test all`.
   add_executable(capture_kept capture_kept.c)
   target_link_libraries(capture_kept PRIVATE lumi_flags lumi_capture lumi_base)

@@ -102,6 +102,7 @@ static void request(void *context, uint32_t number, const lumi_wire_Request *ask
         tell(b, b->now + 2 * BENCH_NS, event);
         break;
     case lumi_wire_Request_test_triggers_tag:
+        b->tests_fired++;
         for (int c = 0; c < BENCH_CAMERAS; c++)
             if (asked->command.test_triggers.cameras & 1u << c)
                 frame(b, b->now + 3000000, b->exchanged ? 1 - c : c, -1);
@@ -176,8 +177,18 @@ static void command(void *context, int camera, uint32_t number, const struct lum
 {
     struct bench *b = context;
 
-    if (asked->kind == LUMI_CAMERA_CONFIGURE)
+    if (asked->kind == LUMI_CAMERA_CONFIGURE) {
         b->exposure[camera] = asked->setting.exposure_s;
+        b->trigger[camera] = asked->setting.trigger;
+    }
+    if (asked->kind == LUMI_CAMERA_TRIGGER) {
+        if (b->trigger[camera] != LUMI_TRIGGER_SOFTWARE || !b->armed[camera])
+            abort();
+        b->fired[camera]++;
+        frame(b, b->now + 3000000, camera, -1);
+    }
+    b->armed[camera] = asked->kind == LUMI_CAMERA_ARM ||
+                       (b->armed[camera] && asked->kind != LUMI_CAMERA_CONFIGURE && asked->kind != LUMI_CAMERA_DISARM);
     if (asked->kind == LUMI_CAMERA_EXPOSE)
         b->exposure[camera] = asked->exposure_s;
     b->told_exposures += asked->kind == LUMI_CAMERA_EXPOSE;
@@ -251,6 +262,16 @@ static void give_verdict(struct bench *b, const struct bench_due *thing)
     b->verdict_rejects -= b->verdict_rejects > 0;
     memmove(b->smears, b->smears + 1, sizeof b->smears - sizeof b->smears[0]);
     lumi_engine_judged(b->engine, b->now, thing->id, LUMI_OK, "", &numbers, NULL);
+}
+
+static void picture(void *context, const struct lumi_engine_picture *shown)
+{
+    struct bench *b = context;
+
+    if (!shown->spare || !shown->frame->release)
+        return;
+    b->shown += shown->shot >= 0 && shown->name[0];
+    b->looked += shown->shot < 0 && !shown->name[0];
 }
 
 static void hand_over(void *context, const char *capture)
@@ -444,6 +465,7 @@ void bench_engine(struct bench *b)
                                             .camera_command = command,
                                             .lamp = lamp,
                                             .judge = judge,
+                                            .picture = picture,
                                             .hand_over = hand_over,
                                             .drive_check = b->drive_says ? drive_check : NULL,
                                             .drive_sweep = b->drive_says ? drive_sweep : NULL,
@@ -458,6 +480,7 @@ void bench_engine(struct bench *b)
         struct lumi_camera_notice notice = {.kind = LUMI_CAMERA_CAME};
         snprintf(notice.identity.serial, sizeof notice.identity.serial, "%d", 100 + c);
         notice.identity.device_clock = notice.identity.exposure_control = true;
+        notice.identity.software_trigger = b->by_software;
         lumi_engine_camera_notice(b->engine, b->now, c, &notice);
         notice = (struct lumi_camera_notice){.kind = LUMI_CAMERA_STATUS};
         notice.status.battery = b->battery > 0 ? b->battery : NAN;

@@ -47,6 +47,11 @@ struct bench {
     uint64_t sequence[BENCH_CAMERAS];
     double exposure[BENCH_CAMERAS];
     int told_exposures;
+    bool by_software;                                /* they have a software trigger */
+    enum lumi_camera_trigger trigger[BENCH_CAMERAS]; /* as set */
+    bool armed[BENCH_CAMERAS];
+    int fired[BENCH_CAMERAS];          /* by software */
+    int tests_fired;                   /* by the board */
     bool silent;                       /* their frames tell no exposure time */
     bool exchanged;                    /* their trigger wires */
     int tests_lost;                    /* so many frames of test shots do not come */
@@ -60,6 +65,8 @@ struct bench {
     int drive_code;
     /* the disk */
     bool disk_full;
+    /* what was shown: frames of shots, others */
+    int shown, looked;
     /* what was told */
     char handed[1024], last_incident[512];
     unsigned states_told;           /* a bit each */

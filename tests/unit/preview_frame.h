@@ -1,4 +1,5 @@
-/* Frames in memory for the tests of previews: one colour, or grey columns, in every layout; who holds them is counted. */
+/* Frames in memory for the tests of previews: one colour, or grey columns, in every layout; who holds them is counted.
+ */
 #ifndef LUMI_TESTS_UNIT_PREVIEW_FRAME_H
 #define LUMI_TESTS_UNIT_PREVIEW_FRAME_H
 
