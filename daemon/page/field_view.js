@@ -15,7 +15,7 @@ const ASPECT = 3 / 2;
 const SMALL = 240;         // pixels across while something moves
 const LARGE = 720;         // at most, at rest
 const REST_MS = 250;
-const RETRY_MS = 2000;
+const LOOK_MS = 5000;
 const NEWS_MS = 1000;      // a picture is asked for anew at most so often because more frames came in
 const PITCH_MOST = 85 * Math.PI / 180;
 const REACH = 0.7;         // of the sphere's radius: further out there is nothing to be seen from
@@ -26,7 +26,6 @@ export class FieldView {
         this.shown = null; // the picture, and the pose it was made for
         this.under = false;
         this.made = 0;
-        this.absent = false;
         this.said = h("p", { class: "field-said", role: "status" });
         this.hint = h("p", { class: "hint", id: "field-hint" }, t("field.hint"));
         this.canvas = h("canvas", { class: "field-canvas", tabindex: "0", role: "application", "aria-label": t("field.label"),
@@ -65,10 +64,8 @@ export class FieldView {
         this.seen.observe(this.stage);
         this.sizes = new ResizeObserver(() => this.changed());
         this.sizes.observe(this.stage);
-        this.offs = [stream.on("field", (data) => this.news(data)), stream.on("open", () => this.look()),
-            store.on("profile", () => {})];
+        this.offs = [stream.on("field", (data) => this.news(data)), stream.on("open", () => this.look())];
         document.addEventListener("visibilitychange", () => this.ask(), { signal: this.stop.signal });
-        document.addEventListener("lumi-estop", () => this.abort?.abort(), { signal: this.stop.signal });
         this.look();
     }
 
@@ -119,7 +116,7 @@ export class FieldView {
     // ---- pictures ----
 
     ask() {
-        if (!this.stale || this.under || !this.visible || document.hidden || this.absent || this.stop.signal.aborted)
+        if (!this.stale || this.under || !this.visible || document.hidden || !this.frames() || this.stop.signal.aborted)
             return;
         this.stale = false;
         this.under = true;
@@ -148,20 +145,19 @@ export class FieldView {
     }
 
     failed(error) {
-        this.absent = error.word === "absent";
         if (this.stop.signal.aborted || error.word === "stopped")
             return;
-        if (this.shown && error.word !== "busy") {
+        if (this.shown)
             setText(this.said, errorWords(error));
-        } else if (!this.shown) {
-            this.none.hidden = false;
-            this.element.dataset.state = this.absent ? "absent" : "none";
-            setText(this.none, this.absent ? t("field.absent") : error.word === "busy" ? t("field.none", { detail: error.detail }) : errorWords(error));
-        }
-        setTimeout(() => {
-            this.stale = true;
-            this.ask();
-        }, RETRY_MS);
+        else
+            this.nothing(error.word === "absent" ? "absent" : "failed", error.word === "absent" ? t("field.absent") : errorWords(error));
+        this.lookLater();
+    }
+
+    nothing(state, words) {
+        this.none.hidden = false;
+        this.element.dataset.state = state;
+        setText(this.none, words);
     }
 
     // The picture there is, shifted to where one looks by now: until the right one comes.
@@ -178,35 +174,51 @@ export class FieldView {
 
     // ---- how much there is ----
 
+    frames() {
+        return Number(this.element.dataset.frames);
+    }
+
     tell(data) {
         if (Number.isFinite(data.frames))
             this.element.dataset.frames = String(data.frames);
         if (Number.isFinite(data.rows))
             this.element.dataset.rows = String(data.rows);
-        const frames = Number(this.element.dataset.frames), rows = Number(this.element.dataset.rows);
-        setText(this.said, frames > 0 ? t("field.made", { n: frames, rows: t("field.rows", { n: rows }) }) : t("field.nothing"));
+        setText(this.said, this.frames() ? t("field.made", { n: this.frames(), rows: t("field.rows", { n: Number(this.element.dataset.rows) }) })
+            : t("field.nothing"));
+        if (!this.frames()) { // another capture has begun
+            this.shown = null;
+            this.canvas.getContext("2d").clearRect(0, 0, this.canvas.width, this.canvas.height);
+            this.nothing("none", t("field.none"));
+        }
     }
 
     news(data) {
         this.tell(data);
-        this.absent = false;
-        if (!this.newsTimer)
-            this.newsTimer = setTimeout(() => {
-                this.newsTimer = 0;
-                this.stale = true;
-                this.ask();
-            }, this.shown ? NEWS_MS : 0);
+        this.newsTimer ||= setTimeout(() => {
+            this.newsTimer = 0;
+            this.stale = true;
+            this.ask();
+        }, this.shown ? NEWS_MS : 0);
     }
 
     async look() {
+        clearTimeout(this.lookTimer);
         try {
             this.tell(await get("/api/v1/field", { quiet: true }));
-            this.absent = false;
         } catch (error) {
             this.failed(error);
+            return;
         }
         this.stale = true;
         this.ask();
+        if (!this.frames())
+            this.lookLater();
+    }
+
+    lookLater() {
+        clearTimeout(this.lookTimer);
+        if (!this.stop.signal.aborted)
+            this.lookTimer = setTimeout(() => (this.visible && !document.hidden ? this.look() : this.lookLater()), LOOK_MS);
     }
 
     destroy() {
@@ -217,6 +229,7 @@ export class FieldView {
         this.offs.forEach((off) => off());
         clearTimeout(this.rest);
         clearTimeout(this.newsTimer);
+        clearTimeout(this.lookTimer);
         this.shown?.bitmap.close();
         this.shown = null;
     }
