@@ -101,15 +101,15 @@ function dialogOf(reason) {
         said.element,
         form([
             field("name", "login-name", { autocomplete: "username", required: true, autocapitalize: "none",
-                spellcheck: "false", maxlength: 255 }),
+                spellcheck: "false", maxlength: 64 }),
             field("password", "login-password", { type: "password", autocomplete: "current-password",
-                required: true, maxlength: 1024 }),
+                required: true, maxlength: 256 }),
         ], "login-submit", said, done),
         h("details", { open: matchMedia("(pointer: coarse)").matches },
             h("summary", {}, t("login.byCode")),
             h("p", {}, t("login.codeHelp")),
             form([field("code", "login-code", { autocomplete: "one-time-code", required: true, spellcheck: "false",
-                autocapitalize: "characters", maxlength: 64 })], "login-code-submit", said, done)),
+                autocapitalize: "characters", maxlength: 32 })], "login-code-submit", said, done)),
         h("p", { class: "why" }, t("login.forgot")),
     ], { test: "login", keep: true });
     return box.closed;
@@ -210,17 +210,19 @@ export async function openPair() {
             said.error(error);
         }
     };
+    const closer = () => h("div", { class: "row end" },
+        h("button", { type: "button", test: "dialog-close", on: { click: () => box.close() } }, t("close")));
 
     if (!store.get("session")?.users) {
-        await dialog.ask(t("pair.title"), [h("p", {}, t("pair.noUsers")), h("pre", { class: "code" }, "sudo lumi user add NAME --role operate"),
-            h("p", {}, t("pair.noUsersThen"))], { confirm: t("close") });
+        box = dialog.show(t("pair.title"), [h("p", {}, t("pair.noUsers")), h("pre", { class: "code" }, "sudo lumi user add NAME"),
+            h("p", {}, t("pair.noUsersThen")), closer()], { test: "pair-dialog" });
+        await box.closed;
         return;
     }
     box = dialog.show(t("pair.title"), [
         h("div", { class: "row" }, h("label", { class: "field" }, h("span", {}, t("pair.may")), role),
             h("button", { type: "button", class: "primary", test: "pair-make", on: { click: make } }, t("pair.make"))),
-        said.element, shown,
-        h("div", { class: "row end" }, h("button", { type: "button", on: { click: () => box.close() } }, t("close"))),
+        said.element, shown, closer(),
     ], { test: "pair-dialog" });
     await box.closed;
 }

@@ -48,6 +48,9 @@ export function mountMenu(root) {
             details.open = false;
             details.querySelector("summary").focus();
         }
+    }, click: (event) => {
+        if (event.target.closest("button"))
+            details.open = false;
     } } },
     h("summary", { test: "menu" }, h("span", { class: "icon icon-person", "aria-hidden": "true" }), who),
     h("div", { class: "stack panel" }, mine,

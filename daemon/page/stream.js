@@ -133,7 +133,7 @@ async function run() {
 
     running = true;
     while (wanted) {
-        const began = Date.now();
+        let began = Date.now();
 
         try {
             await listen();
@@ -141,7 +141,9 @@ async function run() {
             if (error.status === 401) {
                 connection("lost");
                 // Asks for the login, in place; the stream goes on when there is a session again.
-                await get("/api/v1/capture").catch(() => {});
+                await get("/api/v1/capture").then(() => {
+                    began = 0; // at once
+                }, () => {});
             } else if (error.status !== 0 && error.status !== undefined) {
                 console.warn(`events: ${error.status} ${error.message}`);
             }
