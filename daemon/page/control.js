@@ -32,12 +32,19 @@ function state() {
     return store.get("capture")?.state ?? "unknown";
 }
 
-// Why not, or "".
-export function whyNot(action) {
+// Why nothing at all, or "".
+export function whyNone() {
     if (store.get("connection").state !== "open")
         return t("why.connection");
-    if (!mayOperate())
-        return t("why.watch");
+    return mayOperate() ? "" : t("why.watch");
+}
+
+// Why not this, or "".
+export function whyNot(action) {
+    const all = whyNone();
+
+    if (all)
+        return all;
     if (action.in && !action.in.includes(state()))
         return t(`why.${action.name}`, { state: stateWord(state()) });
     if (action.name === "clear" && !store.get("rig")?.faults?.length && !store.get("estop") && state() !== "interrupted")
@@ -55,7 +62,7 @@ async function send(name, body, options) {
         refresh();
         return true;
     } catch (error) {
-        notice.error(error);
+        notice.error(error, error.word === "busy" ? ` ${t("move.busy")}` : "");
         refresh();
         return false;
     }
@@ -84,7 +91,7 @@ function choice(name, options) {
 const chosen = (root, name) => root.querySelector(`input[name="${name}"]:checked`)?.value;
 
 async function stop() {
-    const content = h("div", {}, choice("when", [["safe", "control.when.safe"], ["now", "control.when.now"]]),
+    const content = h("div", { class: "stack" }, choice("when", [["safe", "control.when.safe"], ["now", "control.when.now"]]),
         choice("then", [["seal", "control.then.seal"], ["keep", "control.then.keep"]]), peopleNow());
 
     if (await dialog.ask(t("control.stop.ask"), content, { confirm: t("control.stop") }))
@@ -102,7 +109,7 @@ async function retake() {
 async function home() {
     const turn = h("input", { type: "number", min: 0, max: 10000, step: 1, value: "0", test: "home-turn",
         inputmode: "numeric" });
-    const content = h("div", {}, choice("how", [["turn", "control.how.turn"], ["wind", "control.how.wind"]]),
+    const content = h("div", { class: "stack" }, choice("how", [["turn", "control.how.turn"], ["wind", "control.how.wind"]]),
         h("label", { class: "field" }, h("span", {}, t("control.turn")), turn));
 
     content.addEventListener("change", () => {
@@ -117,7 +124,7 @@ async function home() {
 async function jog() {
     const degrees = h("input", { type: "number", min: -360, max: 360, step: "any", value: "10", required: true,
         test: "jog-degrees", inputmode: "decimal" });
-    const content = h("div", {}, h("label", { class: "field" }, h("span", {}, t("control.degrees")), degrees),
+    const content = h("div", { class: "stack" }, h("label", { class: "field" }, h("span", {}, t("control.degrees")), degrees),
         h("div", { class: "row wrap" }, [-90, -10, -1, 1, 10, 90].map((by) => h("button", { type: "button",
             class: "small", on: { click: () => {
                 degrees.value = by;
@@ -142,7 +149,7 @@ function button(action, idPrefix) {
 
         element.disabled = reason !== "";
         element.hidden = quick && reason !== "";
-        setText(why, quick ? "" : reason);
+        setText(why, quick || reason === whyNone() ? "" : reason); // what is so for all is said once
     } };
 }
 
@@ -181,6 +188,7 @@ export function mount(root) {
     const quick = actions.filter((one) => QUICK.includes(one.name)).map((action) => button(action, "quick"));
     const bar = h("progress", { max: 1, "aria-label": t("fact.progress"), test: "progress" });
     const numbers = h("dl", { class: "facts" });
+    const none = h("p", { class: "why", test: "control-why" });
     const more = h("button", { type: "button", class: "more", test: "control-more", "aria-expanded": "false",
         "aria-controls": "control-panel", on: { click: () => {
             more.setAttribute("aria-expanded", String(root.classList.toggle("open")));
@@ -192,6 +200,8 @@ export function mount(root) {
         if (state() !== seen)
             notice.age();
         seen = state();
+        setText(none, whyNone());
+        none.hidden = whyNone() === "";
         buttons.forEach((one) => one.update(false));
         quick.forEach((one) => one.update(true));
         progress(bar, capture);
@@ -202,7 +212,7 @@ export function mount(root) {
     unfollow = store.on(["capture", "rig", "disk", "estop", "session", "connection"], update);
     notice = noticeBox();
     fill(root, h("div", { class: "quick" }, quick.map((one) => one.element), more),
-        h("div", { id: "control-panel", class: "stack" }, h("h2", {}, t("control")), bar, numbers, notice.element,
+        h("div", { id: "control-panel", class: "stack" }, h("h2", {}, t("control")), bar, numbers, none, notice.element,
             h("div", { class: "acts" }, buttons.map((one) => one.element))));
     update();
 }

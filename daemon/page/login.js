@@ -185,10 +185,11 @@ function pairing(pair, box) {
     return [
         h("p", {}, t(`pair.how.${pair.role}`)),
         h("img", { class: "qr", src: url, alt: t("pair.qr"), test: "pair-qr" }),
-        h("dl", { class: "facts" },
-            h("dt", {}, t("pair.address")), h("dd", { test: "pair-url" }, String(pair.url ?? "").split("#")[0]),
-            h("dt", {}, t("pair.code")), h("dd", { class: "code", test: "pair-code" }, pair.code),
-            h("dt", {}, t("pair.fingerprint")), h("dd", { class: "code small" }, pair.fingerprint ?? t("unknown"))),
+        h("dl", { class: "facts wide" }, [
+            ["pair.address", { test: "pair-url" }, String(pair.url ?? "").split("#")[0]],
+            ["pair.code", { class: "code", test: "pair-code" }, pair.code],
+            ["pair.fingerprint", { class: "code small" }, pair.fingerprint || t("unknown")],
+        ].map(([key, attributes, text]) => h("div", {}, h("dt", {}, t(key)), h("dd", attributes, text)))),
         h("p", {}, left),
         h("p", { class: "why" }, t("pair.certificate")),
     ];

@@ -1,6 +1,6 @@
 // The preflight: every check with its verdict, the reason and what to do; and the button that starts.
 import { post } from "./api.js";
-import { askMove, RESTING } from "./control.js";
+import { askMove, RESTING, whyNone } from "./control.js";
 import { fill, h, newId, setText } from "./dom.js";
 import { t } from "./i18n.js";
 import { checkPlan, chosenPlan, loadPlans, planFacts, planSelect, problemList } from "./plan_list.js";
@@ -27,10 +27,8 @@ function openReds() {
 
 // Why it cannot be looked, or "".
 function whyNoCheck() {
-    if (store.get("connection").state !== "open")
-        return t("why.connection");
-    if (!mayOperate())
-        return t("why.watch");
+    if (whyNone())
+        return whyNone();
     if (capture() && !RESTING.includes(capture().state))
         return capture().state === "preflight" ? t("why.checking") : t("why.busy", { state: stateWord(capture().state) });
     return chosenPlan() ? "" : t("why.noPlan");
@@ -183,9 +181,8 @@ async function start() {
         starting = true;
         parts?.notice.say("info", t("rig.started"));
     } catch (error) {
-        parts?.notice.error(error);
-        if (error.word === "busy")
-            parts?.notice.element.append(" ", h("a", { href: "#sweep" }, t("rig.toSweep")));
+        parts?.notice.error(error, ...(error.word === "busy" ? [` ${t("move.busy")} `, h("a", { href: "#sweep" },
+            t("rig.toSweep"))] : []));
     }
     refresh();
 }

@@ -76,8 +76,8 @@ export function noticeBox(test = "notice") {
             element.replaceChildren(kind === "bad" ? `${ICONS.red} ` : kind === "good" ? `${ICONS.green} ` : "", text,
                 ...more);
         },
-        error(error) {
-            this.say("bad", errorWords(error));
+        error(error, ...more) {
+            this.say("bad", errorWords(error), ...more);
         },
         clear() {
             element.hidden = true;

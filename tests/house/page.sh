@@ -61,6 +61,14 @@ for name in sending sent away failed givenUp login; do
     grep -qF " data-$attribute=\"$text\"" index.html || say "index.html: data-$attribute is not the text estop.$name"
 done
 
+# All scripts are asked for at once, not one behind the other as each names the next.
+for file in *.js; do
+    grep -qE "(src|href)=\"/page/$file\"" index.html || say "index.html: $file is not loaded ahead (modulepreload)"
+done
+for file in $(grep -oE '(src|href)="/page/[^"]*"' index.html | sed 's,.*/page/,,; s/"//'); do
+    [ -f "$file" ] || say "index.html: there is no $file"
+done
+
 grep -nE '<script[^>]*>[^<]|<style|[ "]style=|[ "]on[a-z]+=|javascript:' index.html && say "index.html: something inline"
 grep -nE 'innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(|new Function' ./*.js && say "markup or code from text"
 grep -nE 'https?://' ./*.js ./*.css index.html | grep -v 'http://www.w3.org/' && say "another host"
