@@ -1,7 +1,7 @@
 #!/bin/sh
 # The operator's page: every text that its scripts name is there in every language, with the same values to fill in, and
 # is nowhere else; nothing is inline, nothing comes from elsewhere, files and functions keep their bounds, and all of it
-# together is under 300 kB.
+# that a browser loads together under 300 kB.
 # usage: page.sh FOLDER
 set -eu
 cd "$1"
@@ -80,6 +80,8 @@ FNR == 1 { if (lines > 600) { print last ": over 600 lines"; bad = 1 } }
 /^}/ && start { if (FNR - start + 1 > 60) { print FILENAME ": " name " over 60 lines"; bad = 1 } start = 0 }
 END { if (lines > 600) { print last ": over 600 lines"; bad = 1 } exit bad }' ./*.js ./*.css || bad=1
 
-size=$(cat ./*.html ./*.js ./*.css ./*.json ./*.svg | wc -c)
-[ "$size" -lt 300000 ] || say "the page has $size bytes, 300000 are the bound"
+# What a browser loads: one language, the longest.
+size=$(cat ./*.html ./*.js ./*.css ./*.svg | wc -c)
+text=$(wc -c texts.*.json | grep -v total | sort -n | awk 'END { print $1 }')
+[ $((size + text)) -lt 300000 ] || say "the page has $((size + text)) bytes, 300000 are the bound"
 exit $bad
