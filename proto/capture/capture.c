@@ -80,6 +80,7 @@ static void release(struct lumi_capture *capture)
         close(capture->frames_fd);
     if (capture->dir_fd >= 0)
         close(capture->dir_fd);
+    lumi_free(capture->copy);
     lumi_free(capture->path);
     lumi_free(capture->final_path);
     lumi_free(capture);

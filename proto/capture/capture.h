@@ -46,6 +46,16 @@ enum lumi_capture_mode { LUMI_CAPTURE_READ = 0, LUMI_CAPTURE_WRITE = 1 };
 int lumi_capture_open(const char *path, enum lumi_capture_mode mode, struct lumi_capture **capture,
                       struct lumi_error *error);
 
+/* Reads a copy in memory, made without any lock (docs/capture-format.md, "Looking at an open capture"): whoever looks,
+ * and however slowly, the writer never waits and can always seal. What was committed when it was called is seen.
+ * LUMI_ERR_BUSY: it is written faster than it can be read; try later. */
+int lumi_capture_open_copy(const char *path, struct lumi_capture **capture, struct lumi_error *error);
+/* Whether rows may have come or gone since the stamp was taken (all zero: never); takes it anew. */
+struct lumi_capture_stamp {
+    uint64_t numbers[6];
+};
+int lumi_capture_changed(const char *path, struct lumi_capture_stamp *stamp, bool *changed, struct lumi_error *error);
+
 /* Seals (below), makes the directory appear under its name. The capture is closed afterwards for writing: only
  * lumi_capture_close may follow. */
 int lumi_capture_publish(struct lumi_capture *capture, const char *date, struct lumi_error *error);

@@ -35,6 +35,7 @@ struct lumi_capture {
     struct capture_pending *pending;               /* files stored in this batch */
     struct capture_statement cache[CAPTURE_CACHE]; /* compiled once, for what is run for every frame */
     int pending_count, pending_capacity;
+    void *copy; /* the database's bytes, for lumi_capture_open_copy */
 };
 
 /* ---- capture_db.c: SQLite ---- */
@@ -82,6 +83,9 @@ extern const struct capture_upgrade capture_upgrades[];
 /* Reads a database that lies in memory (for tests and fuzzing); `name` stands for the path. */
 int lumi_capture_open_memory(const void *data, size_t size, const char *name, struct lumi_capture **capture,
                              struct lumi_error *error);
+/* Brings a database in memory (of lumi_alloc; it may be moved) up to the last commit of its log. What of the log is not
+ * whole is left out. LUMI_ERR_NOMEM, LUMI_ERR_LIMIT. */
+int capture_apply_log(uint8_t **data, size_t *size, const uint8_t *log, size_t log_size);
 /* LUMI_ERR_ARG unless the capture may be written. */
 int capture_need_writable(const struct lumi_capture *capture, struct lumi_error *error);
 
