@@ -24,8 +24,8 @@ static const GOptionEntry options[] = {
     {"pitch", 0, 0, G_OPTION_ARG_DOUBLE, &pitch, "degrees; 90 looks along +Z (0)", "DEGREES"},
     {"fov", 0, 0, G_OPTION_ARG_DOUBLE, &fov, "degrees across the width (70)", "DEGREES"},
     {"size", 's', 0, G_OPTION_ARG_STRING, &size_text, "of the picture (960x640)", "WxH"},
-    {"seconds", 0, 0, G_OPTION_ARG_DOUBLE, &seconds, "with -o: draw after so long, whatever is still to do (all is done)",
-     "S"},
+    {"seconds", 0, 0, G_OPTION_ARG_DOUBLE, &seconds,
+     "with -o: draw after so long, whatever is still to do (all is done)", "S"},
     {"plain", 0, 0, G_OPTION_ARG_NONE, &plain, "no matching: everything lies on one sphere", NULL},
     {"memory", 0, 0, G_OPTION_ARG_INT, &memory_mib, "for views, MiB (512)", "MIB"},
     {"pixels-per-degree", 0, 0, G_OPTION_ARG_DOUBLE, &density, "of views, at most (6)", "N"},
@@ -118,12 +118,13 @@ const struct cli_command cli_preview = {
     .name = "preview",
     .arguments = "CAPTURE (-o OUT | --serve)",
     .summary = "views of a capture that is still being taken",
-    .description = "Draws what is seen from inside the capture with the frames that are stored, as far as they have "
-                   "come. The capture is read without any lock: whoever writes it is never held up. Frames become small views "
-                   "in memory; what they show lies on a sphere at first, and view by view where matching against the "
-                   "neighbours finds it.\n\n"
-                   "It takes what nobody else wants of the processor and the disk, and stays within its memory.\n\n"
-                   "Places are metres from the centre of the capture; +Z is a rig's rotation axis, +X its index mark.",
+    .description =
+        "Draws what is seen from inside the capture with the frames that are stored, as far as they have "
+        "come. The capture is read without any lock: whoever writes it is never held up. Frames become small views "
+        "in memory; what they show lies on a sphere at first, and view by view where matching against the "
+        "neighbours finds it.\n\n"
+        "It takes what nobody else wants of the processor and the disk, and stays within its memory.\n\n"
+        "Places are metres from the centre of the capture; +Z is a rig's rotation axis, +X its index mark.",
     .options = options,
     .min_arguments = 1,
     .max_arguments = 1,

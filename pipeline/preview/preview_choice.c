@@ -4,7 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-#define WORTH 1.5 /* a frame takes the memory of another where it is so much farther from all others than that one is */
+#define WORTH                                                                                                          \
+    1.5 /* a frame takes the memory of another where it is so much farther from all others than that one is            \
+         */
 
 static double between(const struct preview_frame *a, const struct preview_frame *b)
 {

@@ -11,9 +11,9 @@
 #include <math.h>
 #include <string.h>
 
-#define CAP_COSINE 0.77   /* of 40°: a triangle's corners lie no farther from its middle */
-#define FEW 0.2f          /* of the other sides' extent: no neighbour lies that way */
-#define BEYOND 2.0f       /* radii that the last view reaches */
+#define CAP_COSINE 0.77 /* of 40°: a triangle's corners lie no farther from its middle */
+#define FEW 0.2f        /* of the other sides' extent: no neighbour lies that way */
+#define BEYOND 2.0f     /* radii that the last view reaches */
 #define NEAREST 2
 
 static void grow(struct lumi_disk *disk, const struct lumi_pose *own, struct lumi_vec3 other)
@@ -36,8 +36,8 @@ static bool is_of_sphere(const struct lumi_pose *poses, const int corners[3], st
         p[i] = lumi_normalize(lumi_sub(poses[corners[i]].t, centre));
     const struct lumi_vec3 normal = lumi_cross(lumi_sub(p[1], p[0]), lumi_sub(p[2], p[0]));
     const double length = lumi_length(normal);
-    return length > 1e-9 && fabs(lumi_dot(normal, p[0])) > CAP_COSINE * length &&
-           lumi_dot(p[0], p[1]) > 0 && lumi_dot(p[1], p[2]) > 0;
+    return length > 1e-9 && fabs(lumi_dot(normal, p[0])) > CAP_COSINE * length && lumi_dot(p[0], p[1]) > 0 &&
+           lumi_dot(p[1], p[2]) > 0;
 }
 
 /* The two nearest, which are neighbours whatever the triangles say. */

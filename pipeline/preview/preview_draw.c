@@ -44,8 +44,8 @@ static int fill_set(struct lumi_preview *preview, int count, struct lumi_view *v
         const struct preview_frame *frame = preview_frame(preview, (int)i);
         if (frame->state != PREVIEW_LOADED)
             continue;
-        views[at] = (struct lumi_view){
-            .grid = &preview->grid, .pose = frame->pose, .disk = disks[at], .mesh = &frame->mesh};
+        views[at] =
+            (struct lumi_view){.grid = &preview->grid, .pose = frame->pose, .disk = disks[at], .mesh = &frame->mesh};
         images[at++] = frame->image;
     }
     return lumi_viewset_create(count, views, images, LUMI_DISK_OVAL, LUMI_KERNEL_LINEAR, &preview->set, error);

@@ -3,7 +3,6 @@
 #define LUMI_PIPELINE_PREVIEW_PREVIEW_PRIV_H
 
 #include "pipeline/depth/mvs.h"
-#include "pipeline/equiangular/warp.h"
 #include "pipeline/preview/preview.h"
 #include "proto/capture/capture.h"
 #include "proto/lightfield/field.h"
@@ -19,8 +18,8 @@ struct preview_frame {
     struct lumi_pose pose;
     struct lumi_lens lens;
     enum preview_state state;
-    bool seen;          /* in the look that is under way */
-    double distance;    /* to the nearest view that is loaded (metres); INFINITY: there is none */
+    bool seen;                /* in the look that is under way */
+    double distance;          /* to the nearest view that is loaded (metres); INFINITY: there is none */
     struct lumi_raster image; /* U8, the grid's size */
     struct lumi_raster small; /* U8, half that */
     struct lumi_view_mesh mesh;
@@ -33,16 +32,16 @@ struct preview_frame {
 
 struct preview_warp {
     struct lumi_lens lens; /* at the size its pictures are read in */
-    struct lumi_warp *warp;
+    float *positions;      /* x, y in them of a view's pixels */
 };
 
 struct lumi_preview {
     char *path;
     struct lumi_preview_options options;
     struct lumi_capture_stamp stamp;
-    GPtrArray *frames;   /* struct preview_frame, as they came */
-    GHashTable *by_id;   /* of them */
-    GArray *warps;       /* struct preview_warp */
+    GPtrArray *frames; /* struct preview_frame, as they came */
+    GHashTable *by_id; /* of them */
+    GArray *warps;     /* struct preview_warp */
     struct lumi_preview_status status;
     enum lumi_surface surface;
     struct lumi_vec3 centre;
@@ -51,7 +50,7 @@ struct lumi_preview {
     int placed; /* frames whose poses surface, centre and radius are of */
     int most;   /* views that memory holds */
     struct lumi_grid grid, half;
-    struct lumi_warp *halving;
+    float *halving;  /* likewise, of the half's pixels in a view */
     double nearness; /* of the place, by the shapes there are; what has no shape lies there */
     /* What is drawn: the views that are loaded. NULL: to be made anew. */
     struct lumi_viewset *set;

@@ -12,9 +12,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#define WAIT_MS 400       /* between looks at a capture in which nothing happens */
-#define PIECES_A_LOOK 8   /* pieces of work between looks otherwise */
-#define FIRST_VIEWS 6     /* the first picture waits for so many, or all there are */
+#define WAIT_MS 400     /* between looks at a capture in which nothing happens */
+#define PIECES_A_LOOK 8 /* pieces of work between looks otherwise */
+#define FIRST_VIEWS 6   /* the first picture waits for so many, or all there are */
 #define PICTURE_QUALITY 85
 
 struct serving {

@@ -1,75 +1,100 @@
 /* What a view's pixels lie on: a sphere about the place at first, then what matching finds. */
-#include "pipeline/geometry/simplify.h"
 #include "pipeline/preview/preview_priv.h"
 #include "proto/base/memory.h"
 
 #include <math.h>
 #include <string.h>
 
-#define FIRST_DISTANCE 3.0   /* metres, before anything is known */
-#define PROXY_CELLS 4        /* of a tile, each way */
-#define PROXY_EDGE (PROXY_CELLS + 1)
-#define TRIANGLES_A_TILE 24 /* tiles of these views are large: a full view's is a quarter of its angle or less */
+#define FIRST_DISTANCE 3.0 /* metres, before anything is known */
+#define PROXY_CELLS 4      /* of a tile, each way */
+#define SHAPE_CELLS 16
 
-/* ---- the sphere ---- */
+/* ---- meshes ---- */
 
-/* Inverse depth along the axis where the ray (x, y, 1) of the camera meets the sphere. 0: nowhere ahead. */
-static double sphere_depth(const struct lumi_pose *pose, struct lumi_vec3 centre, double distance, double x, double y)
+/* A lattice of cells × cells squares a tile, whose corners lie where `depth_at` (inverse, along the axis) says. The
+ * finished field's meshes take a hundred times as long to make; these show as much in views of this size. */
+struct lattice {
+    int cells;
+    double w_max; /* nothing is nearer */
+    double (*depth_at)(const struct lattice *lattice, double tan_x, double tan_y);
+    const struct lumi_preview *preview;
+    const struct preview_frame *frame;
+    double distance;                /* of the sphere */
+    const struct lumi_raster *half; /* a map of inverse depths */
+};
+
+static void fill_tile(const struct lattice *lattice, const struct lumi_view_mesh *mesh, int tile)
 {
-    const struct lumi_vec3 ray = lumi_rotate(pose->r, lumi_vec3(x, y, 1)), o = lumi_sub(pose->t, centre);
-    const double a = lumi_dot(ray, ray), b = lumi_dot(ray, o), c = lumi_dot(o, o) - distance * distance;
-    const double root = b * b - a * c;
-    const double z = root >= 0 ? (-b + sqrt(root)) / a : 0;
-
-    return z > 0 ? 1 / z : 0;
-}
-
-static void fill_tile(const struct lumi_view_mesh *mesh, int tile, const double w[PROXY_EDGE][PROXY_EDGE])
-{
+    const struct lumi_grid *grid = &lattice->preview->grid;
     struct lumi_mesh_vertex *vertex = lumi_mesh_vertices(mesh, tile);
     uint16_t *index = lumi_mesh_indices(mesh, tile);
+    const int cells = lattice->cells;
 
+    /* One step for all tiles: their edges meet. */
     mesh->tiles[tile].shift = 8;
-    for (int y = 0; y < PROXY_EDGE; y++)
-        for (int x = 0; x < PROXY_EDGE; x++) {
-            const uint16_t a = (uint16_t)(y * PROXY_EDGE + x), b = (uint16_t)(a + 1), c = (uint16_t)(a + PROXY_EDGE);
-            const uint16_t two[6] = {a, b, (uint16_t)(c + 1), a, (uint16_t)(c + 1), c};
-            *vertex++ = (struct lumi_mesh_vertex){(uint8_t)(255 * x / PROXY_CELLS), (uint8_t)(255 * y / PROXY_CELLS),
-                                                  (uint8_t)fmin(w[y][x] / mesh->w_step / 256 + 0.5, 255)};
-            if (x < PROXY_CELLS && y < PROXY_CELLS) {
+    for (int y = 0; y <= cells; y++)
+        for (int x = 0; x <= cells; x++) {
+            const int s = 255 * x / cells, t = 255 * y / cells;
+            const uint16_t a = (uint16_t)(y * (cells + 1) + x), c = (uint16_t)(a + cells + 1);
+            const uint16_t two[6] = {a, (uint16_t)(a + 1), (uint16_t)(c + 1), a, (uint16_t)(c + 1), c};
+            double tan_x, tan_y;
+            lumi_grid_unproject(grid, LUMI_TILE * (tile % grid->cols + s / 255.0),
+                                LUMI_TILE * (tile / grid->cols + t / 255.0), &tan_x, &tan_y);
+            const double d = lattice->depth_at(lattice, tan_x, tan_y) / lattice->w_max * 255;
+            *vertex++ = (struct lumi_mesh_vertex){(uint8_t)s, (uint8_t)t, (uint8_t)fmin(fmax(d + 0.5, 0), 255)};
+            if (x < cells && y < cells) {
                 memcpy(index, two, sizeof two);
                 index += 6;
             }
         }
 }
 
+static int make_mesh(const struct lattice *lattice, struct lumi_view_mesh *mesh)
+{
+    const struct lumi_grid *grid = &lattice->preview->grid;
+    const int tiles = grid->cols * grid->rows, cells = lattice->cells;
+    g_autofree int *vertices = g_new(int, tiles), *triangles = g_new(int, tiles);
+    struct lumi_view_mesh made = {0};
+
+    for (int i = 0; i < tiles; i++) {
+        vertices[i] = (cells + 1) * (cells + 1);
+        triangles[i] = 2 * cells * cells;
+    }
+    LUMI_TRY(lumi_view_mesh_create(&made, grid->cols, grid->rows, vertices, triangles));
+    made.w_step = (float)(lattice->w_max / (255 * 256));
+    for (int i = 0; i < tiles; i++)
+        fill_tile(lattice, &made, i);
+    lumi_view_mesh_finish(mesh);
+    *mesh = made;
+    return LUMI_OK;
+}
+
+/* ---- the sphere ---- */
+
+/* Where the ray (x, y, 1) of the camera meets the sphere. 0: nowhere ahead. */
+static double sphere_depth(const struct lattice *lattice, double x, double y)
+{
+    const struct lumi_pose *pose = &lattice->frame->pose;
+    const struct lumi_vec3 ray = lumi_rotate(pose->r, lumi_vec3(x, y, 1));
+    const struct lumi_vec3 o = lumi_sub(pose->t, lattice->preview->centre);
+    const double a = lumi_dot(ray, ray), b = lumi_dot(ray, o);
+    const double c = lumi_dot(o, o) - lattice->distance * lattice->distance, root = b * b - a * c;
+    const double z = root >= 0 ? (-b + sqrt(root)) / a : 0;
+
+    return z > 0 ? 1 / z : 0;
+}
+
 static int make_proxy(const struct lumi_preview *preview, struct preview_frame *frame, double distance)
 {
     const struct lumi_grid *grid = &preview->grid;
-    const int tiles = grid->cols * grid->rows;
-    int counts[2][LUMI_GRID_MAX * LUMI_GRID_MAX];
-    double w[PROXY_EDGE][PROXY_EDGE];
+    struct lattice lattice = {
+        .cells = PROXY_CELLS, .depth_at = sphere_depth, .preview = preview, .frame = frame, .distance = distance};
 
-    for (int i = 0; i < tiles; i++) {
-        counts[0][i] = PROXY_EDGE * PROXY_EDGE;
-        counts[1][i] = 2 * PROXY_CELLS * PROXY_CELLS;
-    }
-    lumi_view_mesh_finish(&frame->mesh);
-    LUMI_TRY(lumi_view_mesh_create(&frame->mesh, grid->cols, grid->rows, counts[0], counts[1]));
-    /* The greatest inverse depth: the sphere is nowhere nearer than along the axis divided by the tangents' length. */
-    const double nearest = fmax(distance - lumi_length(lumi_sub(frame->pose.t, preview->centre)), distance / 8);
-    frame->mesh.w_step = (float)(4 / nearest / 65535);
-    for (int tile = 0; tile < tiles; tile++) {
-        for (int y = 0; y < PROXY_EDGE; y++)
-            for (int x = 0; x < PROXY_EDGE; x++) {
-                double tan_x, tan_y;
-                lumi_grid_unproject(grid, LUMI_TILE * (tile % grid->cols + (255 * x / PROXY_CELLS) / 255.0),
-                                    LUMI_TILE * (tile / grid->cols + (255 * y / PROXY_CELLS) / 255.0), &tan_x, &tan_y);
-                w[y][x] = sphere_depth(&frame->pose, preview->centre, distance, tan_x, tan_y);
-            }
-        fill_tile(&frame->mesh, tile, w);
-    }
-    return LUMI_OK;
+    for (int i = 0; i <= grid->cols; i++)
+        for (int k = 0; k <= grid->rows; k++)
+            lattice.w_max = fmax(lattice.w_max, sphere_depth(&lattice, grid->tan_x[i], grid->tan_y[k]));
+    lattice.w_max = fmax(1.2 * lattice.w_max, 1e-6);
+    return make_mesh(&lattice, &frame->mesh);
 }
 
 int preview_place_proxies(struct lumi_preview *preview, struct lumi_error *error)
@@ -96,30 +121,6 @@ static struct lumi_mvs_view small_view(const struct lumi_preview *preview, const
     return (struct lumi_mvs_view){.grid = &preview->half, .pose = frame->pose, .image = frame->small};
 }
 
-/* At the view's own size: the nearest pixel, so that edges stay steps. */
-static int enlarge(const struct lumi_preview *preview, const struct lumi_raster *half, struct lumi_raster *full)
-{
-    const struct lumi_grid *grid = &preview->grid;
-    g_autofree int *columns = g_new(int, grid->width);
-    double tan_x, tan_y, x, y = 0;
-
-    LUMI_TRY(lumi_raster_create(full, grid->width, grid->height, 1, LUMI_F32));
-    for (int i = 0; i < grid->width; i++) {
-        lumi_grid_unproject(grid, i + 0.5, 0.5, &tan_x, &tan_y);
-        lumi_grid_project(&preview->half, lumi_vec3(tan_x, tan_y, 1), &x, &y);
-        columns[i] = CLAMP((int)x, 0, half->width - 1);
-    }
-    for (int j = 0; j < grid->height; j++) {
-        lumi_grid_unproject(grid, 0.5, j + 0.5, &tan_x, &tan_y);
-        lumi_grid_project(&preview->half, lumi_vec3(tan_x, tan_y, 1), &x, &y);
-        const float *in = lumi_row_f32(half, CLAMP((int)y, 0, half->height - 1));
-        float *out = lumi_row_f32(full, j);
-        for (int i = 0; i < grid->width; i++)
-            out[i] = in[columns[i]];
-    }
-    return LUMI_OK;
-}
-
 /* Mean inverse distance from the centre of what the map shows. */
 static double nearness_of(const struct lumi_preview *preview, const struct preview_frame *frame,
                           const struct lumi_raster *half)
@@ -135,8 +136,7 @@ static double nearness_of(const struct lumi_preview *preview, const struct previ
             if (!(w > 1e-6))
                 continue;
             lumi_grid_unproject(&preview->half, i + 0.5, j + 0.5, &x, &y);
-            const struct lumi_vec3 point =
-                lumi_to_world(&frame->pose, lumi_scale(lumi_vec3(x, y, 1), 1 / w));
+            const struct lumi_vec3 point = lumi_to_world(&frame->pose, lumi_scale(lumi_vec3(x, y, 1), 1 / w));
             sum += 1 / fmax(lumi_length(lumi_sub(point, preview->centre)), 1e-3);
         }
     return count ? sum / count : 0;
@@ -158,37 +158,38 @@ void preview_measure_nearness(struct lumi_preview *preview)
         preview->nearness = sum / count;
 }
 
-/* Pixels that 1/m of inverse depth moves a point from one view to the next. */
-static double disparity_of(const struct lumi_preview *preview, const struct preview_frame *frame,
-                           struct preview_frame *const *neighbours, int count)
+/* Of the four pixels around a corner the second nearest: edges stay steps, and things two pixels wide stay. */
+static double map_depth(const struct lattice *lattice, double tan_x, double tan_y)
 {
-    const struct lumi_grid *grid = &preview->grid;
-    const int middle = grid->cols / 2;
-    double sum = 0;
+    const struct lumi_raster *half = lattice->half;
+    float w[4];
+    double x, y;
 
-    for (int i = 0; i < count; i++)
-        sum += lumi_length(lumi_sub(neighbours[i]->pose.t, frame->pose.t)) / count;
-    return sum * LUMI_TILE / (grid->tan_x[middle + 1] - grid->tan_x[middle]);
+    if (!lumi_grid_project(&lattice->preview->half, lumi_vec3(tan_x, tan_y, 1), &x, &y))
+        return 0;
+    for (int i = 0; i < 4; i++) {
+        const int column = CLAMP((int)floor(x - 0.5) + (i & 1), 0, half->width - 1);
+        const int row = CLAMP((int)floor(y - 0.5) + (i >> 1), 0, half->height - 1);
+        w[i] = lumi_row_f32(half, row)[column];
+    }
+    const float first = fmaxf(w[0], w[1]), second = fminf(w[0], w[1]);
+    const float third = fmaxf(w[2], w[3]), fourth = fminf(w[2], w[3]);
+    return (double)(first > third ? fmaxf(second, third) : fmaxf(first, fourth));
 }
 
 static int take_mesh(struct lumi_preview *preview, struct preview_frame *frame, const struct lumi_raster *half,
-                     double disparity, struct lumi_error *error)
+                     struct lumi_error *error)
 {
-    struct lumi_simplify_options options;
-    struct lumi_view_mesh mesh = {0};
-    struct lumi_raster full = {0};
+    struct lattice lattice = {
+        .cells = SHAPE_CELLS, .depth_at = map_depth, .preview = preview, .frame = frame, .half = half};
+    float most = 0;
 
-    lumi_simplify_defaults(&options);
-    options.triangles_per_tile = TRIANGLES_A_TILE;
-    options.disparity = disparity;
-    if (enlarge(preview, half, &full) != LUMI_OK)
+    for (int y = 0; y < half->height; y++)
+        for (int x = 0; x < half->width; x++)
+            most = fmaxf(most, lumi_row_f32(half, y)[x]);
+    lattice.w_max = fmax((double)most, 1e-6);
+    if (make_mesh(&lattice, &frame->mesh) != LUMI_OK)
         return lumi_fail(error, LUMI_ERR_NOMEM, "out of memory");
-    const int code = lumi_simplify(&full, NULL, &preview->grid, &options, &mesh, error);
-    lumi_raster_finish(&full);
-    if (code != LUMI_OK)
-        return code;
-    lumi_view_mesh_finish(&frame->mesh);
-    frame->mesh = mesh;
     frame->proxy = -1;
     return LUMI_OK;
 }
@@ -207,8 +208,7 @@ int preview_shape(struct lumi_preview *preview, struct preview_frame *frame, str
     lumi_mvs_defaults(&settings);
     LUMI_GOTO(code, out,
               lumi_mvs_match(&view, neighbour_count, others, &settings, preview->options.threads, &depth, error));
-    LUMI_GOTO(code, out,
-              take_mesh(preview, frame, &depth, disparity_of(preview, frame, neighbours, neighbour_count), error));
+    LUMI_GOTO(code, out, take_mesh(preview, frame, &depth, error));
     frame->nearness = nearness_of(preview, frame, &depth);
     frame->shaped = true;
     frame->stale = false;
