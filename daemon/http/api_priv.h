@@ -12,6 +12,7 @@
 #include <pthread.h>
 
 struct lumi_api_events;
+struct lumi_api_field_views;
 struct lumi_api_guard;
 struct lumi_api_live;
 struct lumi_api_pictures;
@@ -31,6 +32,7 @@ struct lumi_http {
     GPtrArray *refusals;
     struct lumi_api_live *live;
     struct lumi_api_pictures *pictures;
+    struct lumi_api_field_views *field; /* its lock is for both threads */
     /* In both: each has members of its own. */
     struct lumi_api_events *events;
     /* In the engine's. */
@@ -146,6 +148,15 @@ void lumi_api_live_picture(struct lumi_api_live *live, int camera);
 void lumi_api_picture(JsonBuilder *builder, struct lumi_pictures *pictures, const struct lumi_picture *picture);
 /* (transfer full) The picture's file; the bytes hold the picture. */
 GBytes *lumi_api_picture_bytes(struct lumi_picture *picture);
+
+/* ---- the light field so far (api_field.c) ---- */
+
+int lumi_api_field_create(struct lumi_http *http, struct lumi_api_field_views **views, struct lumi_error *error);
+void lumi_api_field_destroy(struct lumi_api_field_views *views); /* the server's thread is no more */
+extern const struct lumi_api_field lumi_api_view_fields[];
+void lumi_api_see_field(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+void lumi_api_serve_field(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_view(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 
 /* ---- connections (api_guard.c) ---- */
 

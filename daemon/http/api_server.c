@@ -253,6 +253,7 @@ static void copy_options(struct lumi_http *http, const struct lumi_http_options 
     http->options.secure = g_strdup(options->secure);
     http->options.host_name = g_strdup(options->host_name);
     http->options.folder = g_strdup(options->folder);
+    http->options.preview = g_strdup(options->preview);
 }
 
 /* ---- the thread ---- */
@@ -319,6 +320,7 @@ static int make_server(struct lumi_http *made, struct lumi_error *error)
     LUMI_GOTO(code, out, lumi_api_events_create(made, &made->events, error));
     made->live = lumi_api_live_create(made);
     made->pictures = lumi_api_pictures_create(made);
+    LUMI_GOTO(code, out, lumi_api_field_create(made, &made->field, error));
     made->guard = lumi_api_guard_create(made);
     soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
     soup_server_add_handler(made->server, NULL, on_request, made, NULL);
@@ -363,6 +365,7 @@ void lumi_http_stop(struct lumi_http *http)
     lumi_api_post_destroy(http->to_server);
     lumi_api_live_destroy(http->live);
     lumi_api_pictures_destroy(http->pictures);
+    lumi_api_field_destroy(http->field);
     lumi_api_events_destroy(http->events);
     lumi_api_door_destroy(http->door);
     lumi_api_guard_destroy(http->guard);
@@ -384,6 +387,7 @@ void lumi_http_stop(struct lumi_http *http)
     g_free((char *)http->options.secure);
     g_free((char *)http->options.host_name);
     g_free((char *)http->options.folder);
+    g_free((char *)http->options.preview);
     g_free(http);
 }
 

@@ -28,6 +28,8 @@ struct lumi_config {
     char access[LUMI_CONFIG_PATH]; /* "": no users */
     char secure[256];              /* "": never */
     double session_idle, session_most;
+    /* [preview] */
+    char preview[LUMI_CONFIG_PATH]; /* the command; "": none */
     /* [process] */
     char command[LUMI_CONFIG_PATH];
     int process_parallel, process_retries;

@@ -21,6 +21,7 @@ const struct lumi_config_group lumi_config_groups[] = {
     {"gpio", "Lines of this computer, CHIP:LINE with the chip's name or label and the line's number or name, then "
              ",active-low and ,debounce_us=N if need be."},
     {"http", "The API, docs/api.md."},
+    {"preview", "The light field so far, as the page shows it."},
     {"process", "What is started with a capture that is sealed."},
     {"ingest", "Captures that arrive in a folder are copied, verified and processed, each once."},
     {NULL, NULL}};
@@ -155,6 +156,10 @@ const struct lumi_config_key lumi_config_keys[] = {
          "How long somebody stays logged in without using it."),
     REAL("http", "session_s", AT(session_most), 1, 31536000, "1209600", "How long somebody stays logged in at all."),
     BYTES("http", "body_max", AT(body_max), 1024, 1 << 30, "1M", "Largest request."),
+    TEXT("preview", "command", TEXT, AT(preview), "lumi preview %c --serve", NULL,
+         "What draws views of the light field so far, when somebody looks at them: words and quotes as in a shell, "
+         "without "
+         "one; %c is the capture. Empty: nothing does."),
     TEXT("process", "command", TEXT, AT(command), "", "lumi process %c -o %o",
          "Words and quotes as in a shell, without one: %c the capture, %n its name, %w its work folder, %o the field "
          "beside it. Empty: nothing is started."),
