@@ -1,6 +1,7 @@
 /* lumi capture plan: plans to begin with, and what a plan comes to. Needs neither rig nor lumid. */
 #include "cli/capture_text.h"
 #include "cli/rig_files.h"
+#include "proto/mechanism/plan_forecast.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -20,24 +21,13 @@ static const GOptionEntry options[] = {
     {0},
 };
 
-struct totals {
-    int shots, frames;
-    double seconds, blur, bytes;
-};
-
-static void add_up(const struct lumi_plan *plan, const struct lumi_rig *rig, struct totals *totals)
+static void forecast(const struct lumi_plan *plan, const struct lumi_rig *rig, struct lumi_plan_forecast *totals)
 {
-    uint32_t cameras = lumi_plan_cameras(plan, rig);
+    double bytes[LUMI_RIG_CAMERAS];
 
-    *totals = (struct totals){.shots = lumi_plan_shots(plan),
-                              .frames = lumi_plan_frames(plan, rig),
-                              .seconds = lumi_plan_seconds(plan, rig),
-                              .blur = lumi_plan_blur(plan, rig)};
-    for (int i = 0; i < rig->camera_count; i++) {
-        const struct lumi_lens *lens = &rig->lenses[rig->cameras[i].lens].lens;
-        if (cameras >> i & 1)
-            totals->bytes += (double)lens->width * lens->height * pixel_bytes * totals->shots;
-    }
+    for (int i = 0; i < LUMI_RIG_CAMERAS; i++)
+        bytes[i] = pixel_bytes;
+    lumi_plan_forecast(plan, rig, bytes, totals);
 }
 
 static const char *mode_name(enum lumi_plan_mode mode)
@@ -47,7 +37,8 @@ static const char *mode_name(enum lumi_plan_mode mode)
     return names[mode];
 }
 
-static void put_json(JsonBuilder *builder, const char *name, const struct lumi_plan *plan, const struct totals *totals)
+static void put_json(JsonBuilder *builder, const char *name, const struct lumi_plan *plan,
+                     const struct lumi_plan_forecast *totals)
 {
     const struct {
         const char *name;
@@ -55,7 +46,11 @@ static void put_json(JsonBuilder *builder, const char *name, const struct lumi_p
     } numbers[] = {{"seconds", totals->seconds},
                    {"blur", totals->blur},
                    {"bytes", totals->bytes},
-                   {"bytes_per_second", totals->bytes / totals->seconds}};
+                   {"bytes_per_second", totals->bytes_per_second},
+                   {"blur_near", totals->blur_near},
+                   {"view_volume_m", totals->volume},
+                   {"view_volume_height_m", totals->volume_height},
+                   {"nearest_sharp_m", totals->nearest}};
 
     json_builder_begin_object(builder);
     json_builder_set_member_name(builder, "plan");
@@ -82,19 +77,21 @@ static void print_builder(JsonBuilder *builder)
     puts(text);
 }
 
-static void print_row(const char *name, const struct lumi_plan *plan, const struct totals *totals)
+static void print_row(const char *name, const struct lumi_plan *plan, const struct lumi_plan_forecast *totals)
 {
     g_autofree char *bytes = g_format_size((guint64)totals->bytes);
     char time[32];
 
     cli_duration(totals->seconds, time, sizeof time);
-    printf("%-8s %-11s %6d %7d %10s %10s %8.1f MB/s %5.2f px\n", name, mode_name(plan->mode), totals->shots,
-           totals->frames, time, bytes, totals->bytes / totals->seconds * 1e-6, totals->blur);
+    printf("%-8s %-11s %6d %7d %10s %10s %8.1f MB/s %5.2f px %5.2f m %6.2f m\n", name, mode_name(plan->mode),
+           totals->shots, totals->frames, time, bytes, totals->bytes_per_second * 1e-6, totals->blur, totals->volume,
+           totals->nearest);
 }
 
 static void print_head(void)
 {
-    printf("%-8s %-11s %6s %7s %10s %10s %13s %8s\n", "plan", "mode", "shots", "frames", "time", "disk", "", "blur");
+    printf("%-8s %-11s %6s %7s %10s %10s %13s %8s %7s %8s\n", "plan", "mode", "shots", "frames", "time", "disk", "",
+           "blur", "volume", "nearest");
 }
 
 /* All there are, each with what it comes to for this rig or why it cannot be. */
@@ -102,7 +99,7 @@ static int print_all(const struct lumi_rig *rig, struct lumi_error *error)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
     struct lumi_error why;
-    struct totals totals;
+    struct lumi_plan_forecast totals;
     struct lumi_plan plan;
 
     (void)error;
@@ -120,7 +117,7 @@ static int print_all(const struct lumi_rig *rig, struct lumi_error *error)
                 printf("%-8s not with this rig: %s\n", name, why.text);
             continue;
         }
-        add_up(&plan, rig, &totals);
+        forecast(&plan, rig, &totals);
         if (json)
             put_json(builder, name, &plan, &totals);
         else
@@ -149,10 +146,10 @@ static int print_one(const char *name, const struct lumi_rig *rig, struct lumi_e
     static char text[LUMI_PLAN_TEXT_MAX];
     g_autoptr(JsonBuilder) builder = json_builder_new();
     struct lumi_plan plan;
-    struct totals totals;
+    struct lumi_plan_forecast totals;
 
     LUMI_TRY(read_plan(name, rig, &plan, error));
-    add_up(&plan, rig, &totals);
+    forecast(&plan, rig, &totals);
     if (print) {
         lumi_plan_print(&plan, rig, text, sizeof text);
         fputs(text, stdout);
@@ -193,7 +190,10 @@ const struct cli_command cli_capture_plan = {
         "as the rig is meant), slow (twice its time and exposure), still (stands at every position), hdr (the same "
         "with "
         "three exposures). Prints shots, frames, how long the sweep takes, what it needs on the disk and how fast, and "
-        "how far pictures smear at the sphere's equator. Without PLAN a line for each of the plans to begin with.\n\n"
+        "how far pictures smear at the sphere's equator; the radius within which every view is there; and how near to "
+        "the "
+        "cameras things may be to be rendered sharp (proto/mechanism/plan_forecast.h has the formulas). Without PLAN a "
+        "line for each of the plans to begin with.\n\n"
         "Ends with exit status 3 and one line where the rig cannot do it. Nothing is asked of rig or lumid.",
     .options = options,
     .max_arguments = 1,

@@ -117,8 +117,9 @@ void engine_go(struct lumi_engine *e, enum engine_stage stage)
 /* On while the rig may move. */
 static void light_lamp(struct lumi_engine *e)
 {
-    const bool lit = e->moving || (e->home_wanted && !engine_board_rests(e)) || e->state == LUMI_ENGINE_HOMING ||
-                     e->state == LUMI_ENGINE_SWEEPING || e->state == LUMI_ENGINE_PAUSING;
+    const bool lit = e->moving || ((e->home_wanted || e->jogging) && !engine_board_rests(e)) ||
+                     e->state == LUMI_ENGINE_HOMING || e->state == LUMI_ENGINE_SWEEPING ||
+                     e->state == LUMI_ENGINE_PAUSING;
 
     if (lit != e->lit && e->ports.lamp)
         e->ports.lamp(e->ports.context, lit);
@@ -204,7 +205,11 @@ void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, in
             [AT_TRIGGERED] = LUMI_FRAME_TRIGGERED, [AT_RECEIVED] = LUMI_FRAME_TRIGGERED,
             [AT_STORED] = LUMI_FRAME_RECEIVED,     [AT_ACCEPTED] = LUMI_FRAME_ACCEPTED,
             [AT_REJECTED] = LUMI_FRAME_REJECTED,   [AT_MISSING] = LUMI_FRAME_REJECTED};
-        told.frame_state = states[engine_frame_at(e, shot, camera)->at];
+        const struct engine_frame *frame = engine_frame_at(e, shot, camera);
+        told.frame_state = states[frame->at];
+        told.frame = engine_frame_number(e, shot, camera);
+        told.letter = engine_frame_letter(e, frame);
+        told.fault = frame->at == AT_REJECTED ? frame->fault : LUMI_JUDGE_GOOD;
     }
     if (kind == LUMI_TALE_CHECK)
         told.shot = -1;

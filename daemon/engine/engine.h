@@ -118,6 +118,9 @@ struct lumi_engine_told {
     int shot, camera, check;
     bool lost;
     enum lumi_frame_state frame_state;
+    int frame;   /* FRAME: as lumi_engine_frame counts */
+    char letter; /* FRAME: as there */
+    enum lumi_judge_fault fault;
     char text[512];
 };
 
@@ -165,6 +168,7 @@ void lumi_engine_rig_notice(struct lumi_engine *engine, int64_t now_ns, const st
 /* `code`, `text` as from lumi_rig_link_command; reply NULL where there is none. */
 void lumi_engine_rig_reply(struct lumi_engine *engine, int64_t now_ns, uint32_t number, int code, const char *text,
                            const lumi_wire_Reply *reply);
+/* Number 0: nobody asked; it is only where the arm is that it tells. */
 void lumi_engine_rig_profile(struct lumi_engine *engine, int64_t now_ns, uint32_t number, int code, const char *text,
                              const struct lumi_rig *rig);
 void lumi_engine_rig_status(struct lumi_engine *engine, int64_t now_ns, const struct lumi_rig_link_snapshot *snapshot);
@@ -197,14 +201,17 @@ int lumi_engine_resume(struct lumi_engine *engine, int64_t now_ns, struct lumi_e
 /* Ends the sweep; with what is there the capture is closed as incomplete (its missing frames named), or kept open. */
 int lumi_engine_stop(struct lumi_engine *engine, int64_t now_ns, bool at_once, bool seal, struct lumi_error *error);
 void lumi_engine_emergency_stop(struct lumi_engine *engine, int64_t now_ns);
-/* All missing and rejected frames, or those named (NULL-terminated), again; also of a capture that is sealed. `capture`
- * NULL: the last one, or the youngest in the folder. */
+/* All missing and rejected frames, or those named (NULL-terminated), again, also good ones; also of a capture that is
+ * sealed. `capture` NULL: the last one, or the youngest in the folder. While the sweep of that capture goes on, named
+ * frames are taken again after it. */
 int lumi_engine_retake(struct lumi_engine *engine, int64_t now_ns, const char *capture, const char *const *frames,
                        struct lumi_error *error);
 int lumi_engine_clear(struct lumi_engine *engine, int64_t now_ns, struct lumi_error *error); /* the board's faults */
 /* Looks for the index mark, also while a capture waits because nobody knows where the rig is: `turn` is the one the
  * operator says the arm is in, unless it winds up. What came of it is told as an incident. */
 int lumi_engine_home(struct lumi_engine *engine, int64_t now_ns, int turn, bool wind_up, struct lumi_error *error);
+/* Turns the platform by so many radians, where nothing sweeps and the position is known. */
+int lumi_engine_jog(struct lumi_engine *engine, int64_t now_ns, double radians, struct lumi_error *error);
 /* Opens a capture that a crash left in config.folder, if there is one; *found. It goes on by itself when board and
  * cameras are there, unless it was paused. */
 int lumi_engine_recover(struct lumi_engine *engine, int64_t now_ns, bool *found, struct lumi_error *error);
@@ -240,6 +247,16 @@ struct lumi_engine_camera_status {
     uint64_t matched, dropped, doubled, late, out_of_order, surplus; /* of this capture */
 };
 
+/* Where the arm is, as the board says. */
+struct lumi_engine_arm {
+    bool known, turn_known;              /* without the turn, turn and pitch say nothing */
+    double turn;                         /* turns since step 0 */
+    double yaw;                          /* of the platform, radians from +X, counter-clockwise, -pi..pi */
+    double pitch;                        /* radians that every arm angle has fallen */
+    int camera_count;                    /* of the rig's profile */
+    double cameras[LUMI_RIG_CAMERAS][3]; /* centre to camera, unit vectors */
+};
+
 struct lumi_engine_status {
     enum lumi_engine_state state;
     char text[512];
@@ -256,6 +273,7 @@ struct lumi_engine_status {
     double disk_bytes_per_second;
     struct lumi_rig_link_snapshot rig;
     bool estop;
+    struct lumi_engine_arm arm;
     int camera_count, check_count;
     struct lumi_engine_camera_status cameras[LUMI_RIG_CAMERAS];
     struct lumi_engine_check checks[LUMI_ENGINE_CHECKS];
@@ -267,10 +285,28 @@ struct lumi_engine_missing {
     char frame[LUMI_CAPTURE_NAME], camera[LUMI_RIG_NAME];
     int shot;
     enum lumi_frame_state state;
+    enum lumi_judge_fault fault; /* GOOD: it was not judged */
     char reason[256];
 };
 /* Frames that are neither stored nor accepted, with the reason; returns how many there are, at most `max` filled in. */
 int lumi_engine_missing(const struct lumi_engine *engine, struct lumi_engine_missing *list, int max);
+
+/* The frames of the plan on the sphere: number = shot * camera_count + camera, cameras those that take part. */
+struct lumi_engine_frames {
+    char capture[1024];
+    int shots, camera_count;
+    int cameras[LUMI_RIG_CAMERAS]; /* as in config.cameras */
+};
+struct lumi_engine_frame {
+    const char *name; /* in the capture, until something happens */
+    /* p planned, w on its way, s stored and not judged (yet), a accepted, f soft or smeared, c clipped, r rejected for
+     * another reason, m missing, t to be taken again, n taken again and good. */
+    char letter;
+    double direction[3]; /* from the centre to its camera, where the shot was taken or is planned; a unit vector */
+};
+bool lumi_engine_frames(const struct lumi_engine *engine, struct lumi_engine_frames *frames); /* false: none yet */
+void lumi_engine_frame(const struct lumi_engine *engine, const struct lumi_engine_frames *frames, int number,
+                       struct lumi_engine_frame *frame);
 
 struct lumi_store *lumi_engine_store(struct lumi_engine *engine); /* NULL: no capture is open */
 

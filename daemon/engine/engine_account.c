@@ -227,7 +227,9 @@ static void stored(struct lumi_engine *e, struct engine_flight *flight, const st
     e->tries = 0;
     frame->dead_row = false;
     engine_frame_go(e, flight->shot, flight->camera, AT_STORED, NULL);
-    if (e->config.judging)
+    if (frame->asked)
+        engine_reject_asked(e, flight->shot, flight->camera);
+    else if (e->config.judging)
         engine_judge(e, flight->shot, flight->camera, flight->held);
 }
 
@@ -248,7 +250,7 @@ static void retake_row(struct lumi_engine *e, struct engine_flight *flight, cons
 
     frame->flying = false;
     frame->row = done->frame;
-    frame->dead_row = false;
+    frame->dead_row = frame->asked = false;
     frame->exposed_ns = LUMI_NO_TIME;
     rename_retake(e->names[(size_t)flight->shot * (size_t)e->config.camera_count + (size_t)flight->camera],
                   ++frame->retakes);
@@ -318,6 +320,7 @@ void engine_frame_lost(struct lumi_engine *e, int shot, int camera, const char *
     vsnprintf(text, sizeof text, format, list);
     va_end(list);
     frame->dead_row |= frame->at == AT_TRIGGERED || frame->at == AT_RECEIVED;
+    frame->asked = false; /* it is taken again for that it is missing */
     engine_frame_go(e, shot, camera, AT_MISSING, text);
     if (!flight)
         return;

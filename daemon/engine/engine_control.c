@@ -7,10 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static bool resting(const struct lumi_engine *e)
-{
-    return e->stage == STAGE_REST && !e->store;
-}
+#define JOG_MOST (2 * LUMI_PI) /* radians at once */
 
 static int copy_overrides(struct lumi_engine *e, const char *const *names, struct lumi_error *error)
 {
@@ -60,8 +57,8 @@ int lumi_engine_start(struct lumi_engine *e, int64_t now_ns, const char *plan_te
 
     start = start ? start : &defaults;
     e->now = now_ns > e->now ? now_ns : e->now;
-    if (!resting(e))
-        return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way (%s)", lumi_engine_state_name(e->state));
+    if (!engine_resting(e))
+        return engine_busy(e, error);
     if (plan_size > LUMI_PLAN_TEXT_MAX || memchr(plan_text, 0, plan_size))
         return lumi_fail(error, LUMI_ERR_FORMAT, "the plan is longer than %d bytes, or no text", LUMI_PLAN_TEXT_MAX);
     LUMI_TRY(lumi_plan_check_text(plan_text, plan_size, "the plan", error));
@@ -154,6 +151,14 @@ int lumi_engine_resume(struct lumi_engine *e, int64_t now_ns, struct lumi_error 
     return LUMI_OK;
 }
 
+static void send_stop(struct lumi_engine *e, bool at_once)
+{
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_stop_tag};
+
+    request.command.stop.at_once = at_once;
+    engine_send(e, &request);
+}
+
 int lumi_engine_stop(struct lumi_engine *e, int64_t now_ns, bool at_once, bool seal, struct lumi_error *error)
 {
     e->now = now_ns > e->now ? now_ns : e->now;
@@ -162,6 +167,10 @@ int lumi_engine_stop(struct lumi_engine *e, int64_t now_ns, bool at_once, bool s
         e->test_camera = -1;
         engine_rest(e, LUMI_ENGINE_IDLE);
         engine_state(e, LUMI_ENGINE_IDLE, "stopped by the operator");
+        return LUMI_OK;
+    }
+    if (engine_resting(e) && e->connected && !engine_board_rests(e)) { /* homing, a jog */
+        send_stop(e, at_once);
         return LUMI_OK;
     }
     if (!engine_taking(e))
@@ -173,11 +182,8 @@ int lumi_engine_stop(struct lumi_engine *e, int64_t now_ns, bool at_once, bool s
         e->cameras[c].given_up |= e->cameras[c].identity.records_itself;
     if (e->stage != STAGE_START && e->stage != STAGE_SWEEP && e->stage != STAGE_PAUSED &&
         e->stage != STAGE_INTERRUPTED && e->stage != STAGE_AFTER && e->stage != STAGE_DRAIN) {
-        if (!engine_board_rests(e) && e->connected) { /* homing, or about to start */
-            lumi_wire_Request request = {.which_command = lumi_wire_Request_stop_tag};
-            request.command.stop.at_once = at_once;
-            engine_send(e, &request);
-        }
+        if (!engine_board_rests(e) && e->connected) /* homing, or about to start */
+            send_stop(e, at_once);
         e->moving = false;
         engine_go(e, STAGE_DRAIN);
     }
@@ -208,25 +214,40 @@ int lumi_engine_clear(struct lumi_engine *e, int64_t now_ns, struct lumi_error *
     return LUMI_OK;
 }
 
-int lumi_engine_home(struct lumi_engine *e, int64_t now_ns, int turn, bool wind_up, struct lumi_error *error)
+/* ---- by hand ---- */
+
+static bool has_drive(const struct lumi_engine *e)
 {
-    lumi_wire_Request request = {.which_command = lumi_wire_Request_home_tag};
+    return (e->rig_known && e->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL) ||
+           (e->board_rig_known && e->board_rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL);
+}
+
+static int may_move(const struct lumi_engine *e, const char *what, struct lumi_error *error)
+{
     char names[128];
 
-    e->now = now_ns > e->now ? now_ns : e->now;
     if (!e->connected || !e->link.status_known)
         return lumi_fail(error, LUMI_ERR_IO, "the board is away");
-    if (!resting(e) && e->stage != STAGE_PAUSED && e->stage != STAGE_INTERRUPTED)
+    if (!engine_resting(e) && e->stage != STAGE_PAUSED && e->stage != STAGE_INTERRUPTED)
         return lumi_fail(error, LUMI_ERR_BUSY, "a capture is under way (%s)", lumi_engine_state_name(e->state));
     if (e->estop)
         return lumi_fail(error, LUMI_ERR_BUSY, "the emergency stop is pressed");
     if (e->faults) {
         engine_faults_text(e->faults, names, sizeof names);
-        return lumi_fail(error, LUMI_ERR_BUSY, "a fault stands: %s: look at the rig, clear, home", names);
+        return lumi_fail(error, LUMI_ERR_BUSY, "a fault stands: %s: look at the rig, clear, %s", names, what);
     }
     if (!engine_board_rests(e))
         return lumi_fail(error, LUMI_ERR_BUSY, "the rig moves already");
-    if (e->rig_known && e->rig.control.motion.drive == LUMI_RIG_DRIVE_EXTERNAL)
+    return LUMI_OK;
+}
+
+int lumi_engine_home(struct lumi_engine *e, int64_t now_ns, int turn, bool wind_up, struct lumi_error *error)
+{
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_home_tag};
+
+    e->now = now_ns > e->now ? now_ns : e->now;
+    LUMI_TRY(may_move(e, "home", error));
+    if (has_drive(e))
         return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "the rig's drive homes by itself when a sweep begins");
     request.command.home.wind_up = wind_up;
     request.command.home.turn = turn;
@@ -236,88 +257,23 @@ int lumi_engine_home(struct lumi_engine *e, int64_t now_ns, int turn, bool wind_
     return LUMI_OK;
 }
 
-/* ---- retakes that somebody asks for ---- */
-
-static int choose(struct lumi_engine *e, const char *const *frames, struct lumi_error *error)
+int lumi_engine_jog(struct lumi_engine *e, int64_t now_ns, double radians, struct lumi_error *error)
 {
-    const size_t all = (size_t)e->shots * (size_t)e->config.camera_count;
-
-    if (!frames || !frames[0])
-        return LUMI_OK;
-    e->chosen = lumi_calloc(all + 1, sizeof *e->chosen);
-    if (!e->chosen)
-        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory");
-    for (int k = 0; frames[k]; k++) {
-        size_t i = 0;
-        while (i < all && (e->frames[i].at == AT_NONE || strcmp(e->names[i], frames[k])))
-            i++;
-        if (i == all)
-            return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: there is no frame '%.80s'", e->capture, frames[k]);
-        e->chosen[i] = true;
-    }
-    return LUMI_OK;
-}
-
-/* Named frames that are good are thrown out: that is what was asked for. */
-static void reject_chosen(struct lumi_engine *e)
-{
-    for (int shot = 0; e->chosen && shot < e->shots; shot++)
-        for (int c = 0; c < e->config.camera_count; c++) {
-            struct engine_frame *frame = engine_frame_at(e, shot, c);
-            struct engine_flight *flight;
-            if (!e->chosen[shot * e->config.camera_count + c] || (frame->at != AT_STORED && frame->at != AT_ACCEPTED) ||
-                !(flight = engine_flight(e, LUMI_STORE_JUDGED)))
-                continue;
-            frame->dead_row = true;
-            frame->judge_due = false;
-            engine_frame_go(e, shot, c, AT_REJECTED, "retake asked for");
-            flight->shot = shot;
-            flight->camera = c;
-            flight->job.frame = frame->row;
-            flight->job.judgement = (struct lumi_capture_judgement){NAN, NAN, NAN, NAN, NAN, NAN, NAN};
-            snprintf(flight->job.text, sizeof flight->job.text, "retake asked for");
-            engine_flight_give(e, flight);
-        }
-}
-
-int lumi_engine_retake(struct lumi_engine *e, int64_t now_ns, const char *capture, const char *const *frames,
-                       struct lumi_error *error)
-{
-    char path[1400];
+    lumi_wire_Request request = {.which_command = lumi_wire_Request_jog_tag};
 
     e->now = now_ns > e->now ? now_ns : e->now;
-    if (!resting(e))
-        return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way (%s)", lumi_engine_state_name(e->state));
-    path[0] = '\0';
-    if (!capture || !capture[0]) {
-        if (e->capture[0])
-            snprintf(path, sizeof path, "%s", e->capture);
-        else
-            engine_youngest(e, path, sizeof path);
-    } else if (capture[0] == '/')
-        snprintf(path, sizeof path, "%s", capture);
-    else
-        snprintf(path, sizeof path, "%s/%s", e->config.folder, capture);
-    if (!path[0])
-        return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: no capture is there; name one (--capture NAME)",
-                         e->config.folder);
-    for (int c = 0; c < LUMI_RIG_CAMERAS; c++)
-        engine_camera_reset(e, c);
-    /* Nothing is unsealed for nothing. */
-    LUMI_TRY(engine_look(e, path, error));
-    LUMI_TRY(choose(e, frames, error));
-    if (!e->chosen && engine_frames_needed(e) + e->at_count[AT_TRIGGERED] == 0)
-        return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: nothing is missing or rejected", path);
-    LUMI_TRY(engine_reopen(e, path, error));
-    LUMI_TRY(choose(e, frames, error));
-    reject_chosen(e);
-    e->round = 1;
-    e->retakes_left = e->config.retakes > 0 ? e->config.retakes - 1 : 0;
-    e->fresh = false;
-    engine_state(e, LUMI_ENGINE_INTERRUPTED, "retakes");
-    e->go_on = true;
-    engine_go(e, STAGE_INTERRUPTED);
-    e->stage_ns = INT64_MIN;
+    LUMI_TRY(may_move(e, "jog", error));
+    if (has_drive(e))
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "the rig's drive is turned at the drive itself");
+    if (!isfinite(radians) || fabs(radians) > JOG_MOST || radians == 0)
+        return lumi_fail(error, LUMI_ERR_ARG, "a jog of %g degrees: up to %g either way, and not none",
+                         radians * 180 / LUMI_PI, JOG_MOST * 180 / LUMI_PI);
+    if (!e->link.status.position_known)
+        return lumi_fail(error, LUMI_ERR_BUSY, "nobody knows where the arm is: home first");
+    request.command.jog.turns = radians / (2 * LUMI_PI);
+    e->jogging = true;
+    e->jog_ns = e->now;
+    engine_send(e, &request);
     engine_step(e);
     return LUMI_OK;
 }

@@ -28,7 +28,7 @@ static struct engine_judging *free_job(struct lumi_engine *e)
     return NULL;
 }
 
-static void pose_of(const struct lumi_engine *e, int shot, int camera, struct lumi_pose *pose)
+void engine_shot_pose(const struct lumi_engine *e, int shot, int camera, struct lumi_pose *pose)
 {
     double turns = e->account_shots[shot].turns;
 
@@ -75,7 +75,7 @@ static void ask(struct lumi_engine *e, struct engine_judging *job, const struct 
 
     if (job->shot >= 0) {
         const int rig = e->cameras[job->camera].rig;
-        pose_of(e, job->shot, job->camera, &job->pose);
+        engine_shot_pose(e, job->shot, job->camera, &job->pose);
         asked.pose = job->pose;
         add_neighbour(e, job, &asked, job->camera, job->shot - e->plan.bracket);
         for (int side = -1; side <= 1; side += 2) {
@@ -185,13 +185,15 @@ static void keep_picture(struct engine_camera *c, const struct engine_judging *j
     c->pictures[oldest] = kept;
 }
 
-static void write_verdict(struct lumi_engine *e, const struct engine_judging *job, bool accepted,
+static void write_verdict(struct lumi_engine *e, const struct engine_judging *job, enum lumi_judge_fault fault,
                           const struct lumi_judge_numbers *numbers, const char *reason)
 {
     struct engine_frame *frame = engine_frame_at(e, job->shot, job->camera);
     struct engine_flight *flight = engine_flight(e, LUMI_STORE_JUDGED);
+    const bool accepted = fault == LUMI_JUDGE_GOOD;
 
     frame->dead_row = !accepted;
+    frame->fault = (uint8_t)fault;
     if (!accepted) { /* told with the frame below */
         char text[400];
         snprintf(text, sizeof text, "shot %d of %s: %s", job->shot, e->config.cameras[job->camera].name, reason);
@@ -227,18 +229,19 @@ static bool is_as_smeared(const struct engine_frame *frame, const struct lumi_ju
            turned < SMEAR_TURNED;
 }
 
-static bool is_accepted(struct lumi_engine *e, const struct engine_judging *job,
-                        const struct lumi_judge_numbers *numbers, char *reason, size_t size)
+static enum lumi_judge_fault judged(struct lumi_engine *e, const struct engine_judging *job,
+                                    const struct lumi_judge_numbers *numbers, char *reason, size_t size)
 {
     struct engine_camera *c = e->cameras + job->camera;
     struct engine_frame *frame = engine_frame_at(e, job->shot, job->camera);
     const double usual = lumi_judge_usual_sharpness(&c->usual);
     struct lumi_judge_limits limits = e->config.judge;
-    bool accepted = lumi_judge_verdict(numbers, &limits, usual, reason, size);
+    enum lumi_judge_fault fault;
+    bool accepted = lumi_judge_verdict(numbers, &limits, usual, &fault, reason, size);
 
     if (!accepted && numbers->blur_pixels > limits.blur_pixels && is_as_smeared(frame, numbers)) {
         limits.blur_pixels = INFINITY;
-        accepted = lumi_judge_verdict(numbers, &limits, usual, reason, size);
+        accepted = lumi_judge_verdict(numbers, &limits, usual, &fault, reason, size);
         if (accepted)
             snprintf(reason, size,
                      "as smeared as the time before, over %.1f pixels: the place looks so, or the sweep is too fast",
@@ -246,7 +249,7 @@ static bool is_accepted(struct lumi_engine *e, const struct engine_judging *job,
     }
     frame->smear = (float)numbers->blur_pixels;
     frame->smear_angle = (float)numbers->blur_angle;
-    return accepted;
+    return fault;
 }
 
 static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int code, const char *text,
@@ -254,15 +257,15 @@ static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int 
 {
     struct engine_camera *c = e->cameras + job->camera;
     struct engine_frame *frame = engine_frame_at(e, job->shot, job->camera);
+    enum lumi_judge_fault fault;
     char reason[256] = "";
-    bool accepted;
 
     frame->judging = false;
     if (frame->at != AT_STORED || !e->store)
         return;
     if (code == LUMI_ERR_FORMAT || code == LUMI_ERR_UNSUPPORTED) {
         snprintf(reason, sizeof reason, "it is no picture: %.200s", text ? text : "");
-        write_verdict(e, job, false, NULL, reason);
+        write_verdict(e, job, LUMI_JUDGE_OTHER, NULL, reason);
         return;
     }
     if (code != LUMI_OK || !numbers) { /* stays stored, and good until somebody says otherwise */
@@ -270,10 +273,10 @@ static void take_verdict(struct lumi_engine *e, struct engine_judging *job, int 
                         e->config.cameras[job->camera].name, text ? text : "");
         return;
     }
-    accepted = is_accepted(e, job, numbers, reason, sizeof reason);
-    if (accepted)
+    fault = judged(e, job, numbers, reason, sizeof reason);
+    if (fault == LUMI_JUDGE_GOOD)
         lumi_judge_usual_add(&c->usual, numbers->sharpness);
-    write_verdict(e, job, accepted, numbers, reason);
+    write_verdict(e, job, fault, numbers, reason);
 }
 
 void lumi_engine_judged(struct lumi_engine *e, int64_t now_ns, uint64_t id, int code, const char *text,

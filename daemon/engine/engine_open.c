@@ -51,7 +51,28 @@ static int camera_named(const struct lumi_engine *e, const char *name)
     return -1;
 }
 
-static void place(struct lumi_engine *e, size_t i, const struct lumi_capture_frame *row)
+/* A rejected row says why in words and numbers: the verdict on the numbers says it again, against what the camera's
+ * accepted frames before it have. */
+static enum lumi_judge_fault fault_of(const struct lumi_engine *e, const struct lumi_judge_usual *usual,
+                                      const struct lumi_capture_frame *row)
+{
+    const struct lumi_capture_judgement *j = &row->judgement;
+    const struct lumi_judge_numbers numbers = {.sharpness = row->sharpness,
+                                               .blur_pixels = j->blur_pixels,
+                                               .clipped = j->clipped,
+                                               .dark = j->dark,
+                                               .mean = j->mean,
+                                               .exposure_stops = j->exposure_stops,
+                                               .shift_pixels = j->shift_pixels,
+                                               .moved = j->moved};
+    enum lumi_judge_fault fault;
+
+    if (lumi_judge_verdict(&numbers, &e->config.judge, lumi_judge_usual_sharpness(usual), &fault, NULL, 0))
+        fault = LUMI_JUDGE_OTHER;
+    return fault;
+}
+
+static void place(struct lumi_engine *e, size_t i, const struct lumi_capture_frame *row, struct lumi_judge_usual *usual)
 {
     struct engine_frame *frame = e->frames + i;
     struct engine_shot *shot = e->account_shots + row->plan_shot;
@@ -75,6 +96,9 @@ static void place(struct lumi_engine *e, size_t i, const struct lumi_capture_fra
         break;
     }
     frame->row = row->id;
+    frame->fault = (uint8_t)(at == AT_REJECTED ? fault_of(e, usual, row) : LUMI_JUDGE_GOOD);
+    if (at == AT_ACCEPTED)
+        lumi_judge_usual_add(usual, row->sharpness);
     frame->retakes = row->retake_of ? atoi(strrchr(row->name, '.') ? strrchr(row->name, '.') + 1 : "") - 1 : 0;
     if (row->exposed_time_us != LUMI_NO_TIME)
         frame->exposed_ns = row->exposed_time_us * 1000 - e->utc_offset;
@@ -99,6 +123,7 @@ static void place(struct lumi_engine *e, size_t i, const struct lumi_capture_fra
 /* Rows to account: of a frame and its retakes the last counts. */
 static int read_rows(struct lumi_engine *e, struct lumi_capture *capture, struct lumi_error *error)
 {
+    struct lumi_judge_usual usual[LUMI_RIG_CAMERAS] = {0};
     struct lumi_capture_frame *rows = NULL;
     int count = 0, placed = 0;
 
@@ -112,7 +137,7 @@ static int read_rows(struct lumi_engine *e, struct lumi_capture *capture, struct
         if (rows[i].state == LUMI_FRAME_RETAKEN || e->frames[at].row > rows[i].id)
             continue;
         placed += e->frames[at].row == 0;
-        place(e, at, &rows[i]);
+        place(e, at, &rows[i], &usual[camera]);
     }
     lumi_free(rows);
     if (placed != e->at_count[AT_PLANNED] + e->at_count[AT_TRIGGERED] + e->at_count[AT_STORED] +

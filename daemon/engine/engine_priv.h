@@ -8,6 +8,7 @@
  *   engine_end.c        drain, retakes, seal            engine_open.c      making and opening captures, recovering
  *   engine_status.c     what can be seen                engine_control.c   what an operator wants
  *   engine_look.c       frames for who shows pictures, and pictures while nothing is under way
+ *   engine_sphere.c     frames on the sphere, the arm   engine_retake.c    retakes that somebody asks for
  *
  * A capture goes through stages, one at a time; each stage's function is asked again whenever something has happened,
  * until it goes on to another stage.
@@ -71,6 +72,8 @@ struct engine_frame {
     bool flying;        /* its row is wanted of the store (retake) */
     bool judge_due;     /* stored, to be judged from its file */
     bool judging;
+    bool asked;               /* somebody wants it again, good or not */
+    uint8_t fault;            /* enum lumi_judge_fault, of the rejected */
     bool stuck;               /* the store makes no row for another attempt */
     int retakes;              /* rows before this one */
     float smear, smear_angle; /* of the picture judged last: pixels, radians; 0: none */
@@ -209,11 +212,15 @@ struct lumi_engine {
     int64_t cleared_ns;
     struct lumi_rig rig;
     bool rig_known;
+    struct lumi_rig board_rig; /* of the board that was asked last, whatever the capture's is */
+    bool board_rig_known;
     struct engine_event *events;
     int event_count, event_room;
     uint64_t event_serial;
     uint32_t faults; /* bit a fault, as events and status say */
     bool estop;
+    bool jogging;
+    int64_t jog_ns;
     bool home_wanted;       /* by the operator, beside a capture */
     bool homed, home_found; /* a Homed event came since it was asked for */
     char home_text[128];
@@ -337,6 +344,17 @@ bool engine_shot_needed(const struct lumi_engine *e, int shot);
 void engine_account_free(struct lumi_engine *e);
 void engine_held_drop(struct engine_held *held);
 
+/* ---- engine_sphere.c ---- */
+char engine_frame_letter(const struct lumi_engine *e, const struct engine_frame *frame);
+int engine_frame_number(const struct lumi_engine *e, int shot, int camera);
+void engine_arm(const struct lumi_engine *e, struct lumi_engine_arm *arm);
+
+/* ---- engine_retake.c ---- */
+/* A frame that is stored, and that somebody wants again. */
+void engine_reject_asked(struct lumi_engine *e, int shot, int camera);
+bool engine_resting(const struct lumi_engine *e); /* nothing is under way, and no capture is open */
+int engine_busy(const struct lumi_engine *e, struct lumi_error *error); /* says what is under way */
+
 /* ---- engine_frames.c ---- */
 void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_frame *frame);
 void engine_match_all(struct lumi_engine *e);
@@ -358,6 +376,8 @@ struct engine_judging {
     char path[1280];
 };
 #define ENGINE_JUDGING 32
+/* Where it was taken, or will be. */
+void engine_shot_pose(const struct lumi_engine *e, int shot, int camera, struct lumi_pose *pose);
 void engine_judge(struct lumi_engine *e, int shot, int camera, struct engine_held *held);
 void engine_judge_due(struct lumi_engine *e);
 void engine_judge_forget(struct lumi_engine *e); /* verdicts that are still to come are of no account */

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#define JOG_BEGINS 2.0 /* s, until a jog that was asked for shows in the board's status */
 #define CLOCK_WAIT 5.0 /* s, that an event waits for the clocks to be matched */
 
 /* ---- asking ---- */
@@ -80,6 +81,10 @@ static bool same_profile(const struct lumi_engine *e, const struct lumi_rig *rig
 void lumi_engine_rig_profile(struct lumi_engine *e, int64_t now_ns, uint32_t number, int code, const char *text,
                              const struct lumi_rig *rig)
 {
+    if (code == LUMI_OK && rig) {
+        e->board_rig = *rig;
+        e->board_rig_known = true;
+    }
     if (number && number == e->ask.number && !e->ask.answered && code == LUMI_OK && rig) {
         if (!e->store)
             e->rig = *rig;
@@ -150,6 +155,8 @@ void lumi_engine_rig_status(struct lumi_engine *e, int64_t now_ns, const struct 
     e->connected = open;
     if (open && snapshot->status_known)
         e->faults = snapshot->status.faults;
+    if (e->jogging && engine_since(e, e->jog_ns) > JOG_BEGINS && engine_board_rests(e))
+        e->jogging = false;
     engine_step(e);
 }
 

@@ -93,6 +93,7 @@ void lumi_engine_status(const struct lumi_engine *e, struct lumi_engine_status *
     status->disk_bytes_per_second = e->disk_speed;
     status->rig = e->link;
     status->estop = e->estop;
+    engine_arm(e, &status->arm);
     status->camera_count = e->config.camera_count;
     status->check_count = e->check_count;
     for (int c = 0; c < e->config.camera_count; c++)
@@ -119,6 +120,7 @@ int lumi_engine_missing(const struct lumi_engine *e, struct lumi_engine_missing 
             entry->state = frame->at == AT_PLANNED    ? LUMI_FRAME_PLANNED
                            : frame->at <= AT_RECEIVED ? LUMI_FRAME_TRIGGERED
                                                       : LUMI_FRAME_REJECTED;
+            entry->fault = frame->at == AT_REJECTED ? frame->fault : LUMI_JUDGE_GOOD;
             snprintf(entry->reason, sizeof entry->reason, "%s", frame->reason ? frame->reason : "");
         }
         count++;

@@ -192,45 +192,69 @@ double lumi_judge_usual_sharpness(const struct lumi_judge_usual *usual)
     return (double)sorted[count / 2];
 }
 
-bool lumi_judge_verdict(const struct lumi_judge_numbers *n, const struct lumi_judge_limits *limits,
-                        double usual_sharpness, char *reason, size_t size)
+const char *lumi_judge_fault_name(enum lumi_judge_fault fault)
 {
-    struct line line = {reason, size, 0};
-    bool good = true;
+    static const char *const names[] = {"", "soft", "clipped", "moved", "other"};
 
-    if (size > 0)
-        reason[0] = '\0';
+    return (unsigned)fault <= LUMI_JUDGE_OTHER ? names[fault] : "other";
+}
+
+static void blame(enum lumi_judge_fault *first, enum lumi_judge_fault fault)
+{
+    if (*first == LUMI_JUDGE_GOOD)
+        *first = fault;
+}
+
+static enum lumi_judge_fault judge(const struct lumi_judge_numbers *n, const struct lumi_judge_limits *limits,
+                                   double usual_sharpness, struct line *line)
+{
+    enum lumi_judge_fault fault = LUMI_JUDGE_GOOD;
+
     if (usual_sharpness > 0 && n->sharpness > 0 && n->sharpness < limits->sharpness_share * usual_sharpness) {
-        good = false;
-        say(&line, "not sharp: %.0f %% of what this camera's frames usually have",
-            100 * n->sharpness / usual_sharpness);
+        blame(&fault, LUMI_JUDGE_SOFT);
+        say(line, "not sharp: %.0f %% of what this camera's frames usually have", 100 * n->sharpness / usual_sharpness);
     }
     if (n->blur_pixels > limits->blur_pixels) {
-        good = false;
-        say(&line, "smeared over %.1f pixels", n->blur_pixels);
+        blame(&fault, LUMI_JUDGE_SOFT);
+        say(line, "smeared over %.1f pixels", n->blur_pixels);
     }
     if (n->clipped > limits->clipped) {
-        good = false;
-        say(&line, "%.0f %% of it is white", 100 * n->clipped);
+        blame(&fault, LUMI_JUDGE_CLIPPED);
+        say(line, "%.0f %% of it is white", 100 * n->clipped);
     }
     if (fabs(n->exposure_stops) > limits->exposure_stops) {
-        good = false;
-        say(&line, "%.1f stops %s than its neighbours", fabs(n->exposure_stops),
+        blame(&fault, LUMI_JUDGE_OTHER);
+        say(line, "%.1f stops %s than its neighbours", fabs(n->exposure_stops),
             n->exposure_stops > 0 ? "brighter" : "darker");
     }
     if (n->moved > NOT_FOUND) {
-        good = false;
-        say(&line, "%.0f %% of it is not where its neighbours see it: the camera has moved far, or is blocked",
+        blame(&fault, LUMI_JUDGE_MOVED);
+        say(line, "%.0f %% of it is not where its neighbours see it: the camera has moved far, or is blocked",
             100 * n->moved);
-        return good;
+        return fault;
     }
     if (n->shift_pixels > limits->shift_pixels) {
-        good = false;
-        say(&line, "shifted by %.1f pixels against its neighbours: the camera has moved", n->shift_pixels);
+        blame(&fault, LUMI_JUDGE_MOVED);
+        say(line, "shifted by %.1f pixels against its neighbours: the camera has moved", n->shift_pixels);
     }
     if (n->moved > limits->moved) {
-        good = good && !limits->reject_moved;
-        say(&line, "things moved in %.0f %% of it", 100 * n->moved);
+        if (limits->reject_moved)
+            blame(&fault, LUMI_JUDGE_MOVED);
+        say(line, "things moved in %.0f %% of it", 100 * n->moved);
     }
-    return good;
+    return fault;
+}
+
+bool lumi_judge_verdict(const struct lumi_judge_numbers *numbers, const struct lumi_judge_limits *limits,
+                        double usual_sharpness, enum lumi_judge_fault *fault, char *reason, size_t size)
+{
+    struct line line = {reason, size, 0};
+    enum lumi_judge_fault found;
+
+    if (size > 0)
+        reason[0] = '\0';
+    found = judge(numbers, limits, usual_sharpness, &line);
+    if (fault)
+        *fault = found;
+    return found == LUMI_JUDGE_GOOD;
 }

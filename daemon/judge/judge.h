@@ -59,8 +59,19 @@ struct lumi_judge_usual {
 void lumi_judge_usual_add(struct lumi_judge_usual *usual, double sharpness); /* 0, unknown, counts for nothing */
 double lumi_judge_usual_sharpness(const struct lumi_judge_usual *usual);     /* their median; 0: less than three */
 
-/* Whether it is accepted; `reason` (one line, "" where there is nothing to say) also holds warnings. */
+/* What a rejected frame is rejected for: the first of its reasons, in the order of the verdict. */
+enum lumi_judge_fault {
+    LUMI_JUDGE_GOOD = 0,
+    LUMI_JUDGE_SOFT,    /* not sharp, smeared */
+    LUMI_JUDGE_CLIPPED, /* too much of it is white */
+    LUMI_JUDGE_MOVED,   /* the camera, or what it sees */
+    LUMI_JUDGE_OTHER    /* brighter or darker than its neighbours; whatever is no number */
+};
+const char *lumi_judge_fault_name(enum lumi_judge_fault fault); /* "", "soft", "clipped", "moved", "other" */
+
+/* Whether it is accepted; `reason` (one line, "" where there is nothing to say) also holds warnings. `fault` may be
+ * NULL. */
 bool lumi_judge_verdict(const struct lumi_judge_numbers *numbers, const struct lumi_judge_limits *limits,
-                        double usual_sharpness, char *reason, size_t size);
+                        double usual_sharpness, enum lumi_judge_fault *fault, char *reason, size_t size);
 
 #endif

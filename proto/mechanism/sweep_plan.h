@@ -102,6 +102,14 @@ int lumi_plan_parse(const char *text, size_t size, const char *source, const str
                     struct lumi_plan *plan, struct lumi_error *error);
 /* What can be said of it without a rig: whether it is a plan at all. */
 int lumi_plan_check_text(const char *text, size_t size, const char *source, struct lumi_error *error);
+/* Every line that is wrong; where none is, what the rig cannot do, with the line that the rig could do without, if
+ * there is one. Returns how many, at most `max` filled in; 0: *plan can be run. */
+struct lumi_plan_problem {
+    int line; /* from 1; 0: of no line */
+    char text[256];
+};
+int lumi_plan_problems(const char *text, size_t size, const struct lumi_rig *rig, struct lumi_plan *plan,
+                       struct lumi_plan_problem *problems, int max);
 size_t lumi_plan_print(const struct lumi_plan *plan, const struct lumi_rig *rig, char *text, size_t size);
 #define LUMI_PLAN_TEXT_MAX 4096
 

@@ -56,6 +56,8 @@ static int place(const struct parser *p)
 {
     if (!p->error)
         return LUMI_ERR_FORMAT;
+    if (!p->source) /* the line is told beside */
+        return p->error->code;
     return lumi_fail_prefix(p->error, "%s:%d", p->source, p->line);
 }
 
@@ -230,15 +232,21 @@ static bool was_set(const struct parser *p, const char *name)
     return false;
 }
 
+/* Of no line. */
+static int whole(const struct parser *p, const char *what)
+{
+    return lumi_fail(p->error, LUMI_ERR_FORMAT, "%s%s%s", p->source ? p->source : "", p->source ? ": " : "", what);
+}
+
 /* Exposures given as one and stops about it. */
 static int resolve_exposures(struct parser *p)
 {
     bool one = was_set(p, "exposure_s"), stops = was_set(p, "stops");
 
     if (was_set(p, "exposures_s") && (one || stops))
-        return lumi_fail(p->error, LUMI_ERR_FORMAT, "%s: either exposures_s, or exposure_s and stops", p->source);
+        return whole(p, "either exposures_s, or exposure_s and stops");
     if (stops && !one)
-        return lumi_fail(p->error, LUMI_ERR_FORMAT, "%s: stops about what? exposure_s is missing", p->source);
+        return whole(p, "stops about what? exposure_s is missing");
     if (!one)
         return LUMI_OK;
     p->plan->bracket = stops ? p->stop_count : 1;
@@ -283,6 +291,98 @@ int lumi_plan_parse(const char *text, size_t size, const char *source, const str
     if (lumi_plan_check(plan, rig, error) != LUMI_OK)
         return error ? lumi_fail_prefix(error, "%s", source) : LUMI_ERR_FORMAT;
     return LUMI_OK;
+}
+
+/* ---- Everything that is wrong ---- */
+
+struct complaint {
+    struct lumi_plan_problem *problems;
+    int count, max;
+};
+
+static void complain(struct complaint *c, int line, const char *text)
+{
+    if (c->count < c->max) {
+        c->problems[c->count].line = line;
+        snprintf(c->problems[c->count].text, sizeof c->problems->text, "%.255s", text);
+    }
+    c->count++;
+}
+
+static void undo(struct lumi_plan *plan, const struct lumi_plan *initial, const struct key *key)
+{
+    static const size_t sizes[] = {[WORD] = LUMI_RIG_NAME,    [INTEGER] = sizeof(int),    [REAL] = sizeof(double),
+                                   [SETTLE] = sizeof(double), [MODE] = sizeof plan->mode, [WIND] = sizeof plan->wind};
+
+    if (key->kind == CAMERAS) {
+        plan->cameras = initial->cameras;
+    } else if (key->kind >= EXPOSURES) {
+        plan->bracket = initial->bracket;
+        memcpy(plan->exposures, initial->exposures, sizeof plan->exposures);
+    } else
+        memcpy((char *)plan + key->offset, (const char *)initial + key->offset, sizes[key->kind]);
+}
+
+/* The line without which the rig could do it; the last of them, as that is what was thought of last. */
+static int culprit(const struct parser *p, const int *lines)
+{
+    struct lumi_plan initial, without;
+    int found = 0;
+
+    lumi_plan_init(&initial, p->rig);
+    for (int i = 0; i < KEYS; i++) {
+        if (!p->set[i] || lines[i] < found)
+            continue;
+        without = *p->plan;
+        undo(&without, &initial, &keys[i]);
+        if (lumi_plan_check(&without, p->rig, NULL) == LUMI_OK)
+            found = lines[i];
+    }
+    return found;
+}
+
+static void read_lines(struct parser *p, const char *text, size_t size, struct complaint *c, int *lines)
+{
+    char line[TEXT_LINE];
+    bool before[KEYS];
+
+    for (size_t at = 0; at < size;) {
+        p->line++;
+        memcpy(before, p->set, sizeof before);
+        if (!lumi_text_line(text, size, &at, line, sizeof line)) {
+            complain(c, p->line, "the line is too long or no text");
+            return; /* where the next begins is not known */
+        }
+        if (parse_line(p, line) != LUMI_OK)
+            complain(c, p->line, p->error->text);
+        for (int i = 0; i < KEYS; i++)
+            if (p->set[i] && !before[i])
+                lines[i] = p->line;
+    }
+}
+
+int lumi_plan_problems(const char *text, size_t size, const struct lumi_rig *rig, struct lumi_plan *plan,
+                       struct lumi_plan_problem *problems, int max)
+{
+    struct lumi_error error = {0};
+    struct parser parser = {.rig = rig, .plan = plan, .error = &error};
+    struct complaint c = {problems, 0, max};
+    int lines[KEYS] = {0};
+
+    lumi_plan_init(plan, rig);
+    if (size > LUMI_PLAN_TEXT_MAX) {
+        lumi_fail(&error, LUMI_ERR_LIMIT, "a plan of %zu bytes, at most %d are read", size, LUMI_PLAN_TEXT_MAX);
+        complain(&c, 0, error.text);
+        return c.count;
+    }
+    read_lines(&parser, text, size, &c, lines);
+    if (!parser.section && !c.count)
+        complain(&c, 0, "section 'sweep' is missing");
+    if (!c.count && resolve_exposures(&parser) != LUMI_OK)
+        complain(&c, 0, error.text);
+    if (!c.count && lumi_plan_check(plan, rig, &error) != LUMI_OK)
+        complain(&c, culprit(&parser, lines), error.text);
+    return c.count;
 }
 
 /* ---- Writing ---- */

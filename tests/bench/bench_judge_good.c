@@ -64,7 +64,7 @@ static void judge_good(struct camera *cameras, int camera, const struct lumi_ras
         add(&cameras[camera + 1].last[0], neighbours, &count);
     lumi_judge_measure(picture, &frame->lens, &frame->pose, 0.01, 1, neighbours, count, &n, NULL);
     double usual = lumi_judge_usual_sharpness(&cameras[camera].usual);
-    bool good = lumi_judge_verdict(&n, &limits, usual, reason, sizeof reason);
+    bool good = lumi_judge_verdict(&n, &limits, usual, NULL, reason, sizeof reason);
     tally->frames++;
     tally->rejected += !good;
     tally->warned += good && reason[0];

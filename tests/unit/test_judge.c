@@ -91,7 +91,7 @@ static void nothing_is_found_in_a_good_frame(void **state)
     assert_true(fabs(n.exposure_stops) < 0.03);
     assert_true(n.shift_pixels < 0.5);
     assert_true(n.moved < 0.02);
-    assert_true(lumi_judge_verdict(&n, &limits, n.sharpness, reason, sizeof reason));
+    assert_true(lumi_judge_verdict(&n, &limits, n.sharpness, NULL, reason, sizeof reason));
     assert_string_equal(reason, "");
 }
 
@@ -155,11 +155,11 @@ static void defocus_takes_sharpness_and_is_no_smear(void **state)
     (void)state;
     assert_true(a.sharpness > 0.4 && b.sharpness < 0.5 * a.sharpness);
     lumi_judge_limits_init(&limits);
-    assert_false(lumi_judge_verdict(&b, &limits, a.sharpness, reason, sizeof reason));
+    assert_false(lumi_judge_verdict(&b, &limits, a.sharpness, NULL, reason, sizeof reason));
     assert_non_null(strstr(reason, "not sharp"));
-    assert_true(lumi_judge_verdict(&b, &limits, 0, reason, sizeof reason)); /* the first frame has no measure */
-    b.sharpness = 0;                                                        /* a plain wall: nothing to tell it by */
-    assert_true(lumi_judge_verdict(&b, &limits, a.sharpness, reason, sizeof reason));
+    assert_true(lumi_judge_verdict(&b, &limits, 0, NULL, reason, sizeof reason)); /* the first frame has no measure */
+    b.sharpness = 0; /* a plain wall: nothing to tell it by */
+    assert_true(lumi_judge_verdict(&b, &limits, a.sharpness, NULL, reason, sizeof reason));
 }
 
 static void clipped_highlights_are_counted(void **state)
@@ -209,10 +209,10 @@ static void a_thing_that_moved_is_seen_by_its_size(void **state)
     assert_true(n.moved > 0.5 * truth && n.moved < 2.5 * truth);
     assert_true(n.shift_pixels < 1);
     lumi_judge_limits_init(&limits);
-    assert_true(lumi_judge_verdict(&n, &limits, 0, reason, sizeof reason)); /* a warning */
+    assert_true(lumi_judge_verdict(&n, &limits, 0, NULL, reason, sizeof reason)); /* a warning */
     assert_non_null(strstr(reason, "moved"));
     limits.reject_moved = true;
-    assert_false(lumi_judge_verdict(&n, &limits, 0, reason, sizeof reason));
+    assert_false(lumi_judge_verdict(&n, &limits, 0, NULL, reason, sizeof reason));
 }
 
 static void a_frame_that_shows_something_else_altogether_is_rejected(void **state)
@@ -229,7 +229,7 @@ static void a_frame_that_shows_something_else_altogether_is_rejected(void **stat
     struct lumi_judge_numbers n = beside(&upside, &fault, 0.01);
     lumi_raster_finish(&upside);
     lumi_judge_limits_init(&limits);
-    assert_false(lumi_judge_verdict(&n, &limits, 0, reason, sizeof reason));
+    assert_false(lumi_judge_verdict(&n, &limits, 0, NULL, reason, sizeof reason));
     assert_non_null(strstr(reason, "not where its neighbours see it"));
 }
 
@@ -279,11 +279,11 @@ static void a_verdict_names_everything_that_is_wrong_in_one_line(void **state)
 
     (void)state;
     lumi_judge_limits_init(&limits);
-    assert_false(lumi_judge_verdict(&n, &limits, 0.5, reason, sizeof reason));
+    assert_false(lumi_judge_verdict(&n, &limits, 0.5, NULL, reason, sizeof reason));
     assert_string_equal(reason, "not sharp: 20 % of what this camera's frames usually have; smeared over 5.0 pixels; "
                                 "40 % of it is white; 1.5 stops darker than its neighbours; shifted by 20.0 pixels "
                                 "against its neighbours: the camera has moved; things moved in 30 % of it");
-    assert_false(lumi_judge_verdict(&n, &limits, 0.5, brief, sizeof brief));
+    assert_false(lumi_judge_verdict(&n, &limits, 0.5, NULL, brief, sizeof brief));
     assert_int_equal(strlen(brief), sizeof brief - 1);
 }
 
