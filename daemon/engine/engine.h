@@ -308,6 +308,10 @@ bool lumi_engine_frames(const struct lumi_engine *engine, struct lumi_engine_fra
 void lumi_engine_frame(const struct lumi_engine *engine, const struct lumi_engine_frames *frames, int number,
                        struct lumi_engine_frame *frame);
 
+/* What the rig is. `source`: "board", which is there; "last", what the board that was there said; "capture": the
+ * profile of the capture that was opened. False: nobody has said. */
+bool lumi_engine_profile(const struct lumi_engine *engine, struct lumi_rig *rig, const char **source);
+
 struct lumi_store *lumi_engine_store(struct lumi_engine *engine); /* NULL: no capture is open */
 
 #endif

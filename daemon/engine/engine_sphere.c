@@ -105,3 +105,12 @@ void engine_arm(const struct lumi_engine *e, struct lumi_engine_arm *arm)
         direction_of(&pose, arm->cameras[c]);
     }
 }
+
+bool lumi_engine_profile(const struct lumi_engine *e, struct lumi_rig *rig, const char **source)
+{
+    if (!e->board_rig_known && !e->rig_known)
+        return false;
+    *rig = e->board_rig_known ? e->board_rig : e->rig;
+    *source = !e->board_rig_known ? "capture" : e->connected ? "board" : "last";
+    return true;
+}

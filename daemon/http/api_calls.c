@@ -19,9 +19,8 @@ static void answer_capture(struct lumi_http *http, struct lumi_api_answer *answe
     lumi_api_answer_json(answer, status, builder);
 }
 
-/* What an operator wanted was taken (202: what comes of it is told by events), or not. */
-static void answer_wish(struct lumi_http *http, struct lumi_api_answer *answer, int code,
-                        const struct lumi_error *error)
+void lumi_api_answer_wish(struct lumi_http *http, struct lumi_api_answer *answer, int code,
+                          const struct lumi_error *error)
 {
     if (code == LUMI_OK)
         answer_capture(http, answer, 202);
@@ -73,7 +72,7 @@ static void start(struct lumi_http *http, struct lumi_api_answer *answer, const 
     struct lumi_error error;
     int code = lumi_engine_start(http->options.engine, now(http), plan, strlen(plan), &wanted, &error);
 
-    answer_wish(http, answer, code, &error);
+    lumi_api_answer_wish(http, answer, code, &error);
 }
 
 static void post_start(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
@@ -93,7 +92,7 @@ static void post_pause(struct lumi_http *http, struct lumi_api_answer *answer, c
     struct lumi_error error;
 
     (void)body;
-    answer_wish(http, answer, lumi_engine_pause(http->options.engine, now(http), &error), &error);
+    lumi_api_answer_wish(http, answer, lumi_engine_pause(http->options.engine, now(http), &error), &error);
 }
 
 static void post_resume(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
@@ -101,7 +100,7 @@ static void post_resume(struct lumi_http *http, struct lumi_api_answer *answer, 
     struct lumi_error error;
 
     (void)body;
-    answer_wish(http, answer, lumi_engine_resume(http->options.engine, now(http), &error), &error);
+    lumi_api_answer_wish(http, answer, lumi_engine_resume(http->options.engine, now(http), &error), &error);
 }
 
 static const struct lumi_api_field stop_fields[] = {
@@ -116,7 +115,7 @@ static void post_stop(struct lumi_http *http, struct lumi_api_answer *answer, co
     int code =
         lumi_engine_stop(http->options.engine, now(http), body->values[0].boolean, body->values[1].boolean, &error);
 
-    answer_wish(http, answer, code, &error);
+    lumi_api_answer_wish(http, answer, code, &error);
 }
 
 static const struct lumi_api_field retake_fields[] = {
@@ -131,7 +130,7 @@ static void post_retake(struct lumi_http *http, struct lumi_api_answer *answer, 
     int code = lumi_engine_retake(http->options.engine, now(http), body->values[0].string,
                                   (const char *const *)body->values[1].strings, &error);
 
-    answer_wish(http, answer, code, &error);
+    lumi_api_answer_wish(http, answer, code, &error);
 }
 
 static void post_clear(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
@@ -139,7 +138,7 @@ static void post_clear(struct lumi_http *http, struct lumi_api_answer *answer, c
     struct lumi_error error;
 
     (void)body;
-    answer_wish(http, answer, lumi_engine_clear(http->options.engine, now(http), &error), &error);
+    lumi_api_answer_wish(http, answer, lumi_engine_clear(http->options.engine, now(http), &error), &error);
 }
 
 static const struct lumi_api_field home_fields[] = {
@@ -154,7 +153,7 @@ static void post_home(struct lumi_http *http, struct lumi_api_answer *answer, co
     int code =
         lumi_engine_home(http->options.engine, now(http), body->values[0].number, body->values[1].boolean, &error);
 
-    answer_wish(http, answer, code, &error);
+    lumi_api_answer_wish(http, answer, code, &error);
 }
 
 struct stop_letter {
@@ -300,8 +299,13 @@ const struct lumi_api_route lumi_api_routes[] = {
     {"/api/v1/capture/retake", "POST", LUMI_API_OPERATE, retake_fields, post_retake, NULL},
     {"/api/v1/capture/clear", "POST", LUMI_API_OPERATE, no_fields, post_clear, NULL},
     {"/api/v1/capture/home", "POST", LUMI_API_OPERATE, home_fields, post_home, NULL},
+    {"/api/v1/capture/jog", "POST", LUMI_API_OPERATE, lumi_api_jog_fields, lumi_api_post_jog, NULL},
+    {"/api/v1/capture/frames", "GET", LUMI_API_WATCH, NULL, lumi_api_get_frames, NULL},
     {"/api/v1/capture/emergency-stop", "POST", LUMI_API_WATCH, no_fields, NULL, serve_emergency_stop},
     {"/api/v1/captures", "GET", LUMI_API_WATCH, NULL, NULL, lumi_api_serve_captures},
+    {"/api/v1/profile", "GET", LUMI_API_WATCH, NULL, lumi_api_get_profile, NULL},
+    {"/api/v1/plans", "GET", LUMI_API_WATCH, NULL, lumi_api_get_plans, NULL},
+    {"/api/v1/plans/check", "POST", LUMI_API_WATCH, lumi_api_check_fields, lumi_api_post_check, NULL},
     {"/api/v1/missing", "GET", LUMI_API_WATCH, NULL, get_missing, NULL},
     {"/api/v1/processing", "GET", LUMI_API_WATCH, NULL, get_processing, NULL},
     {"/api/v1/processing", "POST", LUMI_API_OPERATE, process_fields, post_processing, NULL},

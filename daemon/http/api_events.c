@@ -176,8 +176,13 @@ static void describe(JsonBuilder *builder, const struct lumi_engine_told *told, 
     if ((told->kind == LUMI_TALE_FRAME || told->kind == LUMI_TALE_INCIDENT) && told->camera >= 0 &&
         told->camera < status->camera_count)
         lumi_api_put_text(builder, "camera", status->cameras[told->camera].name);
-    if (told->kind == LUMI_TALE_FRAME)
+    if (told->kind == LUMI_TALE_FRAME) {
+        const char letter[] = {told->letter ? told->letter : 'p', '\0'};
         lumi_api_put_text(builder, "state", lumi_frame_state_name(told->frame_state));
+        lumi_api_put_int(builder, "number", told->frame);
+        lumi_api_put_text(builder, "letter", letter);
+        lumi_api_put_text(builder, "class", lumi_judge_fault_name(told->fault));
+    }
     if (told->kind != LUMI_TALE_SHOT && told->kind != LUMI_TALE_CHECK)
         lumi_api_put_text(builder, "text", told->text);
 }

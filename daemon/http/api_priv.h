@@ -81,6 +81,23 @@ extern const struct lumi_api_route lumi_api_routes[]; /* path NULL ends it */
 void lumi_api_serve_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 void lumi_api_serve_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 
+/* What an operator wanted was taken (202: what comes of it is told by events), or not. */
+void lumi_api_answer_wish(struct lumi_http *http, struct lumi_api_answer *answer, int code,
+                          const struct lumi_error *error);
+
+/* ---- frames on the sphere, by hand (api_frames.c) ---- */
+
+void lumi_api_get_frames(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+extern const struct lumi_api_field lumi_api_jog_fields[];
+void lumi_api_post_jog(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+
+/* ---- profile and plans (api_plans.c) ---- */
+
+void lumi_api_get_profile(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+void lumi_api_get_plans(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+extern const struct lumi_api_field lumi_api_check_fields[];
+void lumi_api_post_check(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+
 /* ---- the page (api_page.c) ---- */
 
 /* Headers that every answer has: what a browser may do with it. */

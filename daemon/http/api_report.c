@@ -3,6 +3,43 @@
 
 #include <math.h>
 
+static void put_disk(JsonBuilder *builder, const struct lumi_engine_status *status)
+{
+    const double rate = status->store.bytes_per_second;
+    const double left = status->disk_free_bytes >= 0 ? (double)status->disk_free_bytes : NAN;
+
+    lumi_api_put_double(builder, "bytes_per_second", rate);
+    lumi_api_put_double(builder, "disk_free_bytes", left);
+    lumi_api_put_double(builder, "disk_seconds_left", rate > 0 ? round(left / rate) : NAN);
+}
+
+/* A hundredth of a degree is more than anybody sees, and what stands still says the same again. */
+static double rounded(double value)
+{
+    return round(value * 1e4) / 1e4;
+}
+
+static void put_arm(JsonBuilder *builder, const struct lumi_engine_arm *arm)
+{
+    if (!arm->known) {
+        lumi_api_put_double(builder, "arm", NAN);
+        return;
+    }
+    lumi_api_put_object(builder, "arm");
+    lumi_api_put_double(builder, "turn", arm->turn_known ? rounded(arm->turn) : NAN);
+    lumi_api_put_double(builder, "yaw", rounded(arm->yaw));
+    lumi_api_put_double(builder, "pitch", arm->turn_known ? rounded(arm->pitch) : NAN);
+    lumi_api_put_array(builder, "cameras");
+    for (int c = 0; c < arm->camera_count && arm->turn_known; c++) {
+        json_builder_begin_array(builder);
+        for (int i = 0; i < 3; i++)
+            json_builder_add_double_value(builder, rounded(arm->cameras[c][i]));
+        json_builder_end_array(builder);
+    }
+    json_builder_end_array(builder);
+    json_builder_end_object(builder);
+}
+
 void lumi_api_capture(JsonBuilder *builder, const struct lumi_engine_status *status)
 {
     const struct {
@@ -25,6 +62,8 @@ void lumi_api_capture(JsonBuilder *builder, const struct lumi_engine_status *sta
     lumi_api_put_int(builder, "bytes", status->bytes);
     lumi_api_put_double(builder, "seconds_left", status->seconds_left);
     lumi_api_put_bool(builder, "complete", status->complete);
+    put_disk(builder, status);
+    put_arm(builder, &status->arm);
 }
 
 void lumi_api_check(JsonBuilder *builder, const struct lumi_engine_check *check)
@@ -196,6 +235,7 @@ void lumi_api_missing(JsonBuilder *builder, const struct lumi_engine_missing *mi
     lumi_api_put_text(builder, "camera", missing->camera);
     lumi_api_put_int(builder, "shot", missing->shot);
     lumi_api_put_text(builder, "state", lumi_frame_state_name(missing->state));
+    lumi_api_put_text(builder, "class", lumi_judge_fault_name(missing->fault));
     lumi_api_put_text(builder, "reason", missing->reason);
 }
 

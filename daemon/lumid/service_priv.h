@@ -31,6 +31,7 @@ struct lumi_service {
     struct lumi_pool *requests; /* one thread: in order */
     struct lumi_pool *drives;   /* one thread */
     struct lumi_drive_map drive_map;
+    bool profile_asked;       /* of the board, since it was there first */
     bool drive_busy;          /* it takes the link's notices */
     atomic_bool drive_cancel; /* at the next position */
     atomic_bool drive_stop;   /* now: an emergency stop */
@@ -60,6 +61,8 @@ void lumi_service_picture(void *context, const struct lumi_engine_picture *pictu
 void lumi_service_pictures_tick(struct lumi_service *service, int64_t now);
 /* service_rig.c */
 void lumi_service_rig_ports(struct lumi_service *service, struct lumi_engine_ports *ports);
+/* For where the arm is and what plans come to; the engine asks for itself before a sweep. */
+void lumi_service_read_profile(struct lumi_service *service);
 /* Asks the board, or the drive, to stop at the next safe place; a reply is not waited for. To the engine this is a
  * pause from elsewhere: the capture goes on by itself next time, other than after lumi_engine_pause. */
 void lumi_service_rest(struct lumi_service *service);

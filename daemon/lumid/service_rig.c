@@ -108,6 +108,12 @@ static void read_profile(void *context, uint32_t number)
     give(service->requests, service, &asked->task, &asked->code, &asked->error);
 }
 
+void lumi_service_read_profile(struct lumi_service *service)
+{
+    service->profile_asked = true;
+    read_profile(service, 0);
+}
+
 /* ---- at once ---- */
 
 static void stored(void *context, const lumi_wire_Event *event)

@@ -108,6 +108,14 @@ void lumi_service_chip(void *context, int line, bool gone)
 
 /* ---- notices ---- */
 
+/* Which rig it is, is asked when nobody wants to know yet: where the arm is, what plans come to. */
+static void greet(struct lumi_service *service, const struct lumi_rig_notice *notice)
+{
+    lumi_service_log(6, "the board is there%s", notice->restarted ? "; it has started again" : "");
+    if (notice->restarted || !service->profile_asked)
+        lumi_service_read_profile(service);
+}
+
 static bool drain_link(struct lumi_service *service)
 {
     struct lumi_rig_link_snapshot snapshot;
@@ -118,7 +126,7 @@ static bool drain_link(struct lumi_service *service)
         return false;
     while (count < AT_ONCE && lumi_rig_link_notice(service->link, 0, &notice)) {
         if (notice.kind == LUMI_RIG_NOTICE_CONNECTED)
-            lumi_service_log(6, "the board is there%s", notice.restarted ? "; it has started again" : "");
+            greet(service, &notice);
         else if (notice.kind == LUMI_RIG_NOTICE_DISCONNECTED)
             lumi_service_log(4, "the board is gone: %s", notice.text);
         lumi_engine_rig_notice(service->engine, lumi_service_now(), &notice);

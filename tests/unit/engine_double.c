@@ -134,6 +134,14 @@ int lumi_engine_home(struct lumi_engine *engine, int64_t now_ns, int turn, bool 
     return answer("home", error);
 }
 
+int lumi_engine_jog(struct lumi_engine *engine, int64_t now_ns, double radians, struct lumi_error *error)
+{
+    (void)engine;
+    (void)now_ns;
+    engine_double.radians = radians;
+    return answer("jog", error);
+}
+
 const char *lumi_engine_state_name(enum lumi_engine_state state)
 {
     static const char *const names[] = {"idle",   "preflight",   "red",      "homing",  "arming", "sweeping", "pausing",
@@ -185,4 +193,31 @@ int lumi_ingest_list(struct lumi_ingest *ingest, struct lumi_ingest_status *list
     for (int i = 0; i < engine_double.ingest_count && i < max; i++)
         list[i] = engine_double.ingest[i];
     return engine_double.ingest_count;
+}
+
+bool lumi_engine_frames(const struct lumi_engine *engine, struct lumi_engine_frames *frames)
+{
+    (void)engine;
+    *frames = engine_double.frames;
+    return frames->shots > 0;
+}
+
+void lumi_engine_frame(const struct lumi_engine *engine, const struct lumi_engine_frames *frames, int number,
+                       struct lumi_engine_frame *frame)
+{
+    static const struct lumi_engine_frame seen[] = {{"c00-t00-p000", 'a', {1, 0, 0}},
+                                                    {"c01-t00-p000", 'p', {-0.6, -0.00001, 0.8}},
+                                                    {"c00-t00-p001.2", 'n', {0.123449, -0.123451, 1}}};
+
+    (void)engine;
+    (void)frames;
+    *frame = seen[number % 3];
+}
+
+bool lumi_engine_profile(const struct lumi_engine *engine, struct lumi_rig *rig, const char **source)
+{
+    (void)engine;
+    *rig = engine_double.rig;
+    *source = engine_double.rig_source;
+    return engine_double.rig_source != NULL;
 }

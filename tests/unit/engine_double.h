@@ -14,11 +14,15 @@ struct engine_double {
     int processing_count;
     struct lumi_ingest_status ingest[2];
     int ingest_count;
-    int code; /* what the next wishes come to */
+    struct lumi_engine_frames frames;
+    struct lumi_rig rig;
+    const char *rig_source; /* NULL: no rig is known */
+    int code;               /* what the next wishes come to */
     char text[256];
     /* asked */
     char call[32], plan[LUMI_PLAN_TEXT_MAX + 1], name[256], title[256], capture[1024], first[256];
     int calls, count;
+    double radians;
     bool preflight_only, at_once, seal, again, has_override;
 };
 extern struct engine_double engine_double;

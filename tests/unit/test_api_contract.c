@@ -139,12 +139,19 @@ static void something_everywhere(void)
     status->rig.status.faults = 1;
     engine_double.missing_count = engine_double.processing_count = engine_double.ingest_count = 1;
     engine_double.processing[0].progress = -1;
+    engine_double.frames.shots = engine_double.frames.camera_count = 1;
+    engine_double.rig_source = "board";
+    assert_int_equal(lumi_rig_builtin("arc16x2", &engine_double.rig, NULL), LUMI_OK);
+    status->arm = (struct lumi_engine_arm){.known = true, .turn_known = true, .camera_count = 1};
+    status->store.bytes_per_second = 1e6;
     status->cameras[0].status.battery = NAN;
 }
 
 static const char *body_for(const char *path)
 {
-    if (strstr(path, "start") || strstr(path, "preflight"))
+    if (strstr(path, "jog"))
+        return "{\"degrees\":-5}";
+    if (strstr(path, "start") || strstr(path, "preflight") || strstr(path, "plans"))
         return "{\"plan\":\"p\"}";
     return strstr(path, "processing") ? "{\"capture\":\"c\"}" : "{}";
 }
