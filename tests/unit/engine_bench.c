@@ -101,6 +101,10 @@ static void request(void *context, uint32_t number, const lumi_wire_Request *ask
         event.kind.homed.found = true;
         tell(b, b->now + 2 * BENCH_NS, event);
         break;
+    case lumi_wire_Request_jog_tag:
+        b->jogged = asked->command.jog.turns;
+        b->step += (int64_t)(b->jogged * lumi_rig_steps_per_turn(&b->rig));
+        break;
     case lumi_wire_Request_test_triggers_tag:
         b->tests_fired++;
         for (int c = 0; c < BENCH_CAMERAS; c++)
@@ -290,6 +294,8 @@ static void told(void *context, const struct lumi_engine_told *tale)
                 tale->camera, tale->text);
     if (tale->kind == LUMI_TALE_STATE)
         b->states_told |= 1u << tale->state;
+    if (tale->kind == LUMI_TALE_FRAME && tale->frame < (int)sizeof b->letters)
+        b->letters[tale->frame] = tale->letter;
     if (tale->kind != LUMI_TALE_INCIDENT)
         return;
     b->incidents++;
@@ -314,6 +320,7 @@ static void give_status(struct bench *b)
     snapshot.status.state = b->faults ? lumi_wire_State_STOPPED : b->state;
     snapshot.status.position_known = snapshot.status.turn_known = b->known;
     snapshot.status.faults = b->faults;
+    snapshot.status.step = b->step;
     snapshot.status_ns = (uint64_t)b->now;
     lumi_engine_rig_status(b->engine, b->now, &snapshot);
 }
@@ -502,6 +509,7 @@ void bench_begin(struct bench *b, enum lumi_plan_mode mode, int bracket)
     b->now = 100 * BENCH_NS;
     b->connected = true;
     b->state = lumi_wire_State_LOST;
+    memset(b->letters, '.', sizeof b->letters);
     b->clock_offset[0] = 7 * BENCH_NS;
     b->clock_offset[1] = -1234567890123LL;
     lumi_engine_config_init(&b->config);

@@ -42,6 +42,8 @@ struct bench {
     int starts, homes;
     bool lit;
     uint32_t home_turn; /* that the last one was told */
+    double jogged;      /* turns, of the last jog */
+    int64_t step;
     /* the cameras */
     int64_t clock_offset[BENCH_CAMERAS];
     uint64_t sequence[BENCH_CAMERAS];
@@ -70,6 +72,7 @@ struct bench {
     /* what was told */
     char handed[1024], last_incident[512];
     unsigned states_told;           /* a bit each */
+    char letters[64];               /* of each frame, as told last; '.' none */
     int incidents, verdict_rejects; /* the judge rejects so many more */
     double smears[4];               /* pixels that it finds in the next ones, until 0 */
     struct lumi_engine_status status;
