@@ -25,6 +25,7 @@ export class FieldView {
         this.pose = { x: 0, y: 0, z: 0, yaw: 0, pitch: 0 };
         this.shown = null; // the picture, and the pose it was made for
         this.under = false;
+        this.viewer = `page${Math.random().toString(36).slice(2)}`;
         this.made = 0;
         this.said = h("p", { class: "field-said", role: "status" });
         this.hint = h("p", { class: "hint", id: "field-hint" }, t("field.hint"));
@@ -116,7 +117,7 @@ export class FieldView {
     // ---- pictures ----
 
     ask() {
-        if (!this.stale || this.under || !this.visible || document.hidden || !this.frames() || this.stop.signal.aborted)
+        if (!this.stale || this.under || !this.visible || document.hidden || !this.some() || this.stop.signal.aborted)
             return;
         this.stale = false;
         this.under = true;
@@ -129,7 +130,7 @@ export class FieldView {
     async fetchView(pose, small) {
         const scale = Math.min(2, devicePixelRatio || 1);
         const width = small ? SMALL : Math.max(SMALL, Math.min(LARGE, 16 * Math.round(this.stage.clientWidth * scale / 16)));
-        const query = new URLSearchParams({ fov: FOV.toFixed(5), width: String(width), height: String(Math.round(width / ASPECT)) });
+        const query = new URLSearchParams({ viewer: this.viewer, fov: FOV.toFixed(5), width: String(width), height: String(Math.round(width / ASPECT)) });
 
         for (const name of ["x", "y", "z", "yaw", "pitch"])
             query.set(name, pose[name].toFixed(5));
@@ -145,11 +146,15 @@ export class FieldView {
     }
 
     failed(error) {
+        const early = error.word === "busy" || error.word === "cancelled";
+
         if (this.stop.signal.aborted || error.word === "stopped")
             return;
-        if (this.shown)
+        if (this.shown && !early)
             setText(this.said, errorWords(error));
-        else
+        else if (!this.shown && early)
+            this.nothing("none", error.detail ? t("field.why", { detail: error.detail }) : t("field.none"));
+        else if (!this.shown)
             this.nothing(error.word === "absent" ? "absent" : "failed", error.word === "absent" ? t("field.absent") : errorWords(error));
         this.lookLater();
     }
@@ -174,6 +179,13 @@ export class FieldView {
 
     // ---- how much there is ----
 
+    // The program that draws starts with the first question, and knows only then how much there is.
+    some() {
+        const capture = store.get("capture");
+
+        return this.frames() > 0 || (capture?.stored ?? 0) + (capture?.accepted ?? 0) > 0;
+    }
+
     frames() {
         return Number(this.element.dataset.frames);
     }
@@ -185,7 +197,7 @@ export class FieldView {
             this.element.dataset.rows = String(data.rows);
         setText(this.said, this.frames() ? t("field.made", { n: this.frames(), rows: t("field.rows", { n: Number(this.element.dataset.rows) }) })
             : t("field.nothing"));
-        if (!this.frames()) { // another capture has begun
+        if (!this.some()) { // nothing yet, or another capture has begun
             this.shown = null;
             this.canvas.getContext("2d").clearRect(0, 0, this.canvas.width, this.canvas.height);
             this.nothing("none", t("field.none"));
@@ -211,7 +223,7 @@ export class FieldView {
         }
         this.stale = true;
         this.ask();
-        if (!this.frames())
+        if (!this.shown)
             this.lookLater();
     }
 

@@ -10,8 +10,9 @@ export const KINDS = [
     { letter: "p", name: "planned", weight: 0, side: "open" },
     { letter: "w", name: "way", weight: 1, side: "open" },
     { letter: "s", name: "stored", weight: 2, side: "open" },
+    { letter: "t", name: "again", weight: 4, side: "open" },
     { letter: "a", name: "good", weight: 3, side: "good" },
-    { letter: "n", name: "retaken", weight: 4, side: "good" },
+    { letter: "n", name: "retaken", weight: 3, side: "good" },
     { letter: "f", name: "soft", weight: 5, side: "bad" },
     { letter: "c", name: "clipped", weight: 6, side: "bad" },
     { letter: "r", name: "rejected", weight: 7, side: "bad" },
@@ -235,11 +236,13 @@ export class Sphere {
         return Math.atan2(d[1], d[0]);
     }
 
-    // Directions of the cameras where the arm is: those of the nearest shot, turned to the arm's yaw. `shot`: the one
-    // taken last, for an arm that is not known and to tell the turns apart.
+    // Directions of the cameras where the arm is: as the board says; where it does not know the turn, those of the nearest
+    // shot, turned to the arm's yaw. `shot`: the one taken last, for an arm that is not known and to tell the turns apart.
     arm(arm, shot) {
         if (!this.count)
             return [];
+        if (arm?.cameras?.length)
+            return arm.cameras;
         let at = Math.min(Math.max(shot, 0), this.shots - 1), by = 0;
         if (arm && Number.isFinite(arm.yaw)) {
             // The first position is at yaw 0 of its turn.

@@ -19,7 +19,7 @@ function whyNot() {
         return t("retake.why.watch");
     if (store.get("connection").state !== "open")
         return t("retake.why.connection");
-    if (!RESTING.includes(store.get("capture")?.state))
+    if (["preflight", "sealing"].includes(store.get("capture")?.state))
         return t("retake.why.busy");
     return "";
 }
@@ -39,12 +39,13 @@ async function retake(notice, changed) {
 
     if (name)
         body.capture = name;
-    if (!await askMove(t("retake.ask"), question(), t("retake.button")))
+    const later = !RESTING.includes(store.get("capture")?.state);
+    if (!await askMove(t(later ? "retake.later" : "retake.ask"), question(), t("retake.button")))
         return;
     notice.say("info", t("sending"));
     try {
         await post("/api/v1/capture/retake", body, { moves: true });
-        notice.say("good", t("retake.sent", { n: body.frames.length }));
+        notice.say("good", t(later ? "retake.later.sent" : "retake.sent", { n: body.frames.length }));
         sphere.chosen.clear();
     } catch (error) {
         notice.error(error);
