@@ -38,12 +38,12 @@ void engine_frame_came(struct lumi_engine *e, int camera, struct lumi_camera_fra
 
     if (!frame)
         return;
+    if (e->config.cameras[camera].black > 0)
+        frame->black = e->config.cameras[camera].black;
     if (e->stage == STAGE_TRIGGERS || (e->stage == STAGE_TEST && e->test_camera >= 0 && !c->identity.records_itself)) {
         engine_test_frame(e, camera, frame);
         return;
     }
-    if (e->config.cameras[camera].black > 0)
-        frame->black = e->config.cameras[camera].black;
     if (!engine_taking(e) || !c->used || !c->match) {
         if (c->looking)
             engine_picture(e, -1, camera, frame);
