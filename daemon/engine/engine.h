@@ -224,6 +224,8 @@ int lumi_engine_recover(struct lumi_engine *engine, int64_t now_ns, bool *found,
  * records by itself, or the rig is not known yet. */
 int lumi_engine_look(struct lumi_engine *engine, int64_t now_ns, int camera, struct lumi_error *error);
 void lumi_engine_look_end(struct lumi_engine *engine, int64_t now_ns, int camera); /* nobody looks any more */
+/* Whether it could be looked through, were nothing under way, and why not. */
+int lumi_engine_look_check(const struct lumi_engine *engine, int camera, struct lumi_error *error);
 
 /* ---- what can be seen ---- */
 

@@ -65,29 +65,22 @@ static double look_exposure(const struct lumi_engine *e)
     return e->plan_known ? e->plan.exposures[0] : 0;
 }
 
-static int check_board(const struct lumi_engine *e, int camera, struct lumi_error *error)
+static bool board_is_free(const struct lumi_engine *e)
 {
-    if (!e->rig_known || e->cameras[camera].rig < 0 || !e->plan_known)
-        return lumi_fail(error, LUMI_ERR_UNSUPPORTED,
-                         "camera %s is fired by the board alone: it shows pictures after the first preflight",
-                         e->config.cameras[camera].name);
-    if (!e->connected || e->look || e->home_wanted || e->estop || e->faults || !engine_board_rests(e))
-        return lumi_fail(error, LUMI_ERR_BUSY, "the board cannot fire camera %s now", e->config.cameras[camera].name);
-    return LUMI_OK;
+    return e->connected && !e->look && !e->home_wanted && !e->estop && !e->faults && engine_board_rests(e);
 }
 
 static void fire(struct lumi_engine *e, int camera)
 {
     lumi_wire_Request request = {.which_command = lumi_wire_Request_test_triggers_tag};
     struct engine_camera *c = e->cameras + camera;
-    struct lumi_error error;
 
     c->look_ns = e->now + LOOK_NS;
     if (e->config.cameras[camera].setting.trigger == LUMI_TRIGGER_FREE)
         return;
     if (!by_board(e, camera)) {
         engine_camera_do(e, camera, LUMI_CAMERA_TRIGGER, look_exposure(e));
-    } else if (check_board(e, camera, &error) == LUMI_OK) {
+    } else if (board_is_free(e)) {
         request.command.test_triggers.cameras = 1u << c->rig;
         request.command.test_triggers.exposure = e->plan.exposures[0];
         e->look = ++e->next_number;
@@ -95,25 +88,35 @@ static void fire(struct lumi_engine *e, int camera)
     }
 }
 
+int lumi_engine_look_check(const struct lumi_engine *e, int camera, struct lumi_error *error)
+{
+    if (camera < 0 || camera >= e->config.camera_count)
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "there is no such camera");
+    if (!e->cameras[camera].there)
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "camera %s is not there", e->config.cameras[camera].name);
+    if (e->cameras[camera].identity.records_itself)
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "camera %s records by itself: it cannot be looked through",
+                         e->config.cameras[camera].name);
+    if (by_board(e, camera) && (!e->rig_known || e->cameras[camera].rig < 0 || !e->plan_known))
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED,
+                         "camera %s is fired by the board alone: it shows pictures after the first preflight",
+                         e->config.cameras[camera].name);
+    return LUMI_OK;
+}
+
 int lumi_engine_look(struct lumi_engine *e, int64_t now_ns, int camera, struct lumi_error *error)
 {
     struct engine_camera *c;
 
     e->now = now_ns > e->now ? now_ns : e->now;
-    if (camera < 0 || camera >= e->config.camera_count)
-        return lumi_fail(error, LUMI_ERR_NOTFOUND, "there is no such camera");
+    LUMI_TRY(lumi_engine_look_check(e, camera, error));
     c = e->cameras + camera;
     if (e->stage != STAGE_REST || e->store)
         return lumi_fail(error, LUMI_ERR_BUSY, "a capture is under way (%s)", lumi_engine_state_name(e->state));
-    if (!c->there)
-        return lumi_fail(error, LUMI_ERR_NOTFOUND, "camera %s is not there", e->config.cameras[camera].name);
-    if (c->identity.records_itself)
-        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "camera %s records by itself: it cannot be looked through",
-                         e->config.cameras[camera].name);
     if (e->now < c->look_ns || (c->looking && c->command))
         return LUMI_OK;
-    if (by_board(e, camera))
-        LUMI_TRY(check_board(e, camera, error));
+    if (by_board(e, camera) && !board_is_free(e))
+        return lumi_fail(error, LUMI_ERR_BUSY, "the board cannot fire camera %s now", e->config.cameras[camera].name);
     if (!c->looking) { /* as a capture wants it or not at all: it is set up anew */
         c->looking = true;
         c->configured = c->armed = c->trusted = false;

@@ -54,6 +54,15 @@ static void put_last(JsonBuilder *builder, struct lumi_pictures *pictures, int c
     lumi_picture_release(picture);
 }
 
+static void put_live(JsonBuilder *builder, struct lumi_http *http, int camera)
+{
+    struct lumi_error error = {0};
+    const bool live = http->options.pictures && lumi_engine_look_check(http->options.engine, camera, &error) == LUMI_OK;
+
+    lumi_api_put_bool(builder, "live", live);
+    lumi_api_put_text(builder, "text", error.text);
+}
+
 void lumi_api_get_cameras(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
     const struct lumi_engine_status *status = http->status;
@@ -68,7 +77,7 @@ void lumi_api_get_cameras(struct lumi_http *http, struct lumi_api_answer *answer
         json_builder_begin_object(builder);
         lumi_api_put_text(builder, "name", camera->name);
         lumi_api_put_bool(builder, "there", camera->there);
-        lumi_api_put_bool(builder, "live", http->options.pictures && camera->there && !camera->identity.records_itself);
+        put_live(builder, http, c);
         put_last(builder, http->options.pictures, c);
         json_builder_end_object(builder);
     }

@@ -33,8 +33,8 @@ if [ "${4:-}" = operate ]; then
     # Nothing is under way: test pictures, of this camera alone, until nobody watches any more.
     "$pictures" "$LUMID_ADDRESS" live c00 3 >live.txt || fail "idle: $(cat live.txt)"
     cameras idle.json
-    grep -q '"name":"c00","there":true,"live":true,"last":{"frame":"","shot":null,' idle.json || fail "no figures: $(cat idle.json)"
-    grep -q '"name":"c01","there":true,"live":true,"last":null' idle.json || fail "c01 was asked, too: $(cat idle.json)"
+    grep -q '"name":"c00","there":true,"live":true,"text":"","last":{"frame":"","shot":null,' idle.json || fail "no figures: $(cat idle.json)"
+    grep -q '"name":"c01","there":true,"live":true,"text":"","last":null' idle.json || fail "c01 was asked, too: $(cat idle.json)"
     rest
 
     # In a sweep: those that come; who watches does not disturb.
@@ -48,7 +48,7 @@ if [ "${4:-}" = operate ]; then
     grep -q "3 different" live.txt || fail "in the sweep: $(cat live.txt)"
     cameras sweep.json
     for camera in c00 c01; do
-        grep -q "\"name\":\"$camera\",\"there\":true,\"live\":true,\"last\":{\"frame\":\"$camera-t0[01]-p00[0-9]\",\"shot\":[0-9]" \
+        grep -q "\"name\":\"$camera\",\"there\":true,\"live\":true,\"text\":\"\",\"last\":{\"frame\":\"$camera-t0[01]-p00[0-9]\",\"shot\":[0-9]" \
             sweep.json || fail "no picture of a frame: $(cat sweep.json)"
         "$pictures" "$LUMID_ADDRESS" get /api/v1/cameras/$camera/last.jpg >$camera.jpg || fail "$camera: no picture"
     done

@@ -142,6 +142,14 @@ int lumi_engine_jog(struct lumi_engine *engine, int64_t now_ns, double radians, 
     return answer("jog", error);
 }
 
+int lumi_engine_look_check(const struct lumi_engine *engine, int camera, struct lumi_error *error)
+{
+    (void)engine;
+    if (engine_double.status.cameras[camera].identity.records_itself)
+        return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "it records by itself");
+    return LUMI_OK;
+}
+
 const char *lumi_engine_state_name(enum lumi_engine_state state)
 {
     static const char *const names[] = {"idle",   "preflight",   "red",      "homing",  "arming", "sweeping", "pausing",

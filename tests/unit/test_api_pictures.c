@@ -101,7 +101,8 @@ static void figures_are_told_of_the_last_picture(void **state)
 {
     struct answer answer = fixture_ask(*state, "GET", "/api/v1/cameras", NULL, NULL);
 
-    assert_string_equal(answer.body, "{\"cameras\":[{\"name\":\"c00\",\"there\":true,\"live\":true,\"last\":null}]}");
+    assert_string_equal(answer.body,
+                        "{\"cameras\":[{\"name\":\"c00\",\"there\":true,\"live\":true,\"text\":\"\",\"last\":null}]}");
     answer_clear(&answer);
     take();
     lumi_pictures_sharpness(pictures, 0, 0, 0.5);
@@ -111,7 +112,7 @@ static void figures_are_told_of_the_last_picture(void **state)
     answer_clear(&answer);
     engine_double.status.cameras[0].identity.records_itself = true;
     answer = fixture_ask(*state, "GET", "/api/v1/cameras", NULL, NULL);
-    assert_non_null(strstr(answer.body, "\"live\":false"));
+    assert_non_null(strstr(answer.body, "\"live\":false,\"text\":\"it records by itself\""));
     answer_clear(&answer);
 }
 

@@ -138,8 +138,10 @@ static void a_camera_that_the_board_alone_fires_is_looked_through_once_the_rig_i
     begin(&b, false);
     assert_int_equal(look_for(&b, 0, 3), LUMI_ERR_UNSUPPORTED);
     assert_int_equal(b.tests_fired, 0);
+    assert_int_equal(lumi_engine_look_check(b.engine, 0, &error), LUMI_ERR_UNSUPPORTED);
     assert_int_equal(bench_start(&b, true, &error), LUMI_OK); /* the preflight alone */
     assert_true(bench_until(&b, LUMI_ENGINE_IDLE, 100));
+    assert_int_equal(lumi_engine_look_check(b.engine, 0, &error), LUMI_OK);
     b.looked = b.tests_fired = 0;
     lumi_engine_look_end(b.engine, b.now, 0);
     look_for(&b, 0, 5);
