@@ -135,6 +135,7 @@ static void let_in(struct lumi_http *http, SoupServerMessage *message, struct lu
     g_strlcpy(who.key, session->id, sizeof who.key);
     attempt_was_good(http, message);
     lumi_api_people_seen(door, &who);
+    lumi_api_guard_known(http->guard, message);
     lumi_api_set_cookie(message, who.secret, http->options.session_most_ns / SECOND, who.tls);
     answer_session(http, message, &who);
 }

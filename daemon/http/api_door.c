@@ -185,6 +185,8 @@ bool lumi_api_admit(struct lumi_http *http, SoupServerMessage *message, const ch
     if (role > LUMI_API_ANYBODY && who->secret[0] && strcmp(method, "GET") && !shows_csrf(message, who))
         return turn_away(message, 403, "csrf", "the request does not show the session's token (X-Lumid-Csrf)");
     lumi_api_people_seen(http->door, who);
+    if (who->role != LUMI_API_ANYBODY)
+        lumi_api_guard_known(http->guard, message);
     return true;
 }
 

@@ -14,7 +14,7 @@
 #include <string.h>
 
 #define RING 2048
-#define LISTENERS 32
+#define LISTENERS 256
 #define BLOCK_BYTES 32768
 #define TICK_MS 500
 #define PING_NS (15 * 1000000000LL)

@@ -29,7 +29,10 @@ struct connection {
     gsize peer_size; /* 0: unknown */
     bool here;       /* this computer */
     bool tls;
-    bool waiting; /* for a request: nothing is being answered */
+    bool known;      /* somebody who may was let in on it */
+    bool ended;      /* it is shut down, and on its way out */
+    uint64_t number; /* in the order they came */
+    bool waiting;    /* for a request: nothing is being answered */
     int64_t until_ns;
 };
 
@@ -44,6 +47,7 @@ struct lumi_api_guard {
     GHashTable *connections; /* GSocket → struct connection */
     GPtrArray *watches;
     GSource *tick;
+    uint64_t count; /* that have come so far */
 };
 
 static int64_t now(const struct lumi_api_guard *guard)
@@ -102,7 +106,8 @@ static bool has_left(const struct connection *connection)
 }
 
 /* Others leave one peer's share to this computer: its operator gets through whatever they do. */
-static bool is_one_too_many(const struct connection *made)
+enum { MANY = 1, MANY_OF_PEER };
+static int is_one_too_many(const struct connection *made)
 {
     const struct lumi_http_options *options = &made->guard->http->options;
     int all = 0, others = 0, peer = 0;
@@ -112,23 +117,62 @@ static bool is_one_too_many(const struct connection *made)
     g_hash_table_iter_init(&at, made->guard->connections);
     while (g_hash_table_iter_next(&at, NULL, &value)) {
         const struct connection *connection = value;
-        if (g_socket_is_closed(connection->socket) || has_left(connection))
+        if (connection->ended || g_socket_is_closed(connection->socket) || has_left(connection))
             continue;
         all++;
         others += !connection->here;
         peer += is_same_peer(connection, made);
     }
-    return all > options->connections_max || peer > options->connections_peer ||
-           (!made->here && others > options->connections_max - options->connections_peer);
+    if (peer > options->connections_peer)
+        return MANY_OF_PEER;
+    return all > options->connections_max ||
+                   (!made->here && others > options->connections_max - options->connections_peer)
+               ? MANY
+               : 0;
 }
 
-static void refuse(const struct connection *connection)
+/* Of those on which nobody has been let in yet the one that has been here longest. */
+static struct connection *oldest_stranger(const struct connection *made)
+{
+    struct connection *oldest = NULL;
+    GHashTableIter at;
+    gpointer value;
+
+    g_hash_table_iter_init(&at, made->guard->connections);
+    while (g_hash_table_iter_next(&at, NULL, &value)) {
+        struct connection *connection = value;
+        if (connection != made && !connection->known && !connection->ended && connection->waiting &&
+            (made->here || !connection->here) && (!oldest || connection->number < oldest->number))
+            oldest = connection;
+    }
+    return oldest;
+}
+
+static void end(struct connection *connection)
+{
+    g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
+    connection->ended = true;
+    connection->until_ns = INT64_MAX;
+}
+
+/* False: there is none to be had. Who says nothing, or nothing that lets them in, gives way to whoever comes: the next
+ * may be the operator's phone. */
+static bool make_room(const struct connection *made, int many)
+{
+    struct connection *stranger = many == MANY ? oldest_stranger(made) : NULL;
+
+    if (stranger)
+        end(stranger);
+    return stranger != NULL;
+}
+
+static void refuse(struct connection *connection)
 {
     g_autofree char *answer = lumi_api_problem_message(503, "limit", "too many connections are open already");
 
     if (!connection->tls)
         g_socket_send_with_blocking(connection->socket, answer, strlen(answer), FALSE, NULL, NULL);
-    g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
+    end(connection);
 }
 
 static void on_gone(void *context, GObject *socket)
@@ -152,10 +196,8 @@ static gboolean on_tick(void *context)
     g_hash_table_iter_init(&at, guard->connections);
     while (g_hash_table_iter_next(&at, NULL, &value)) {
         struct connection *connection = value;
-        if (time > connection->until_ns || (connection->until_ns != INT64_MAX && has_left(connection))) {
-            g_socket_shutdown(connection->socket, TRUE, TRUE, NULL);
-            connection->until_ns = INT64_MAX;
-        }
+        if (time > connection->until_ns || (connection->until_ns != INT64_MAX && has_left(connection)))
+            end(connection);
     }
     return G_SOURCE_CONTINUE;
 }
@@ -174,14 +216,15 @@ static void set_limit(struct lumi_api_guard *guard, SoupServerMessage *message, 
 static bool keep(struct lumi_api_guard *guard, GSocket *socket, bool tls)
 {
     struct connection *made = g_new0(struct connection, 1);
-    bool good;
 
     *made = (struct connection){.guard = guard, .socket = socket, .waiting = true, .tls = tls};
+    made->number = ++guard->count;
     made->until_ns = now(guard) + REQUEST_NS;
     identify(made);
     g_hash_table_insert(guard->connections, socket, made);
     g_object_weak_ref(G_OBJECT(socket), on_gone, guard);
-    good = !is_one_too_many(made);
+    int many = is_one_too_many(made);
+    bool good = !many || make_room(made, many);
     if (!good)
         refuse(made);
     if (!guard->tick)
@@ -223,6 +266,15 @@ static void on_finished(SoupServer *server, SoupServerMessage *message, void *co
 
     (void)server;
     set_limit(guard, message, now(guard) + REQUEST_NS, true);
+}
+
+void lumi_api_guard_known(struct lumi_api_guard *guard, SoupServerMessage *message)
+{
+    GSocket *socket = lumi_api_socket(message);
+    struct connection *connection = socket ? g_hash_table_lookup(guard->connections, socket) : NULL;
+
+    if (connection)
+        connection->known = true;
 }
 
 void lumi_api_guard_spare(struct lumi_api_guard *guard, SoupServerMessage *message)

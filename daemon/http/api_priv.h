@@ -183,6 +183,8 @@ void lumi_api_guard_listeners(struct lumi_api_guard *guard);
 void lumi_api_guard_destroy(struct lumi_api_guard *guard);
 /* A connection that was accepted elsewhere. False: it is one too many, and shut down. */
 bool lumi_api_guard_take(struct lumi_api_guard *guard, GSocket *socket);
+/* Somebody was let in on this message's connection: it gives way to no other. */
+void lumi_api_guard_known(struct lumi_api_guard *guard, SoupServerMessage *message);
 /* Bytes that stand for the peer of a message, an IPv6 one's network; returns how many. */
 size_t lumi_api_guard_peer(SoupServerMessage *message, unsigned char peer[16], bool *here);
 /* This answer may take as long as it likes: as long as the session lasts. */

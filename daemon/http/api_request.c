@@ -267,6 +267,17 @@ static int take_members(JsonObject *object, const struct lumi_api_field *fields,
     return find_missing(fields, body, error);
 }
 
+/* In JSON that is well-formed: what is read as C strings would end there. */
+static bool has_zero(const char *text, size_t size)
+{
+    for (size_t i = 0; i + 5 < size; i++)
+        if (text[i] == '\\' && (text[i + 1] != 'u' || memcmp(text + i + 2, "0000", 4) != 0))
+            i++; /* what is escaped is no beginning of another */
+        else if (text[i] == '\\')
+            return true;
+    return false;
+}
+
 int lumi_api_body_parse(const char *text, size_t size, const struct lumi_api_field *fields, struct lumi_api_body *body,
                         struct lumi_error *error)
 {
@@ -282,6 +293,8 @@ int lumi_api_body_parse(const char *text, size_t size, const struct lumi_api_fie
     fault = lumi_json_fault(text, size);
     if (fault)
         return lumi_fail(error, LUMI_ERR_ARG, "the body is no JSON from byte %td on", fault - text);
+    if (has_zero(text, size))
+        return lumi_fail(error, LUMI_ERR_FORMAT, "a string with a zero (\\u0000) in it");
     if (!json_parser_load_from_data(parser, text, (gssize)size, NULL))
         return lumi_fail(error, LUMI_ERR_ARG, "the body is no JSON");
     root = json_parser_get_root(parser);

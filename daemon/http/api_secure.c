@@ -30,7 +30,8 @@ struct lumi_api_secure {
     GCancellable *cancellable;
     GSource *again;
     int port;
-    bool said; /* that it cannot be opened */
+    char host[LUMI_ADDRESS_TEXT]; /* the one address; "": all */
+    bool said;                    /* that it cannot be opened */
     GTlsCertificate *certificate;
     char fingerprint[LUMI_FINGERPRINT];
     int64_t certified_ns;
@@ -214,21 +215,22 @@ static bool bind_all(struct lumi_api_secure *secure, const struct lumi_api_liste
 
 static void open_listener(struct lumi_api_secure *secure)
 {
-    const char *where = secure->door->http->options.secure;
+    const char *wanted = secure->door->http->options.secure;
     struct lumi_api_listen listen;
     g_autoptr(GError) failed = NULL;
 
-    if (secure->listener || !secure->certificate || !where || !*where ||
-        lumi_api_listen_parse(where, &listen, NULL) != LUMI_OK)
+    if (secure->listener || !secure->certificate || !wanted || !*wanted ||
+        lumi_api_listen_parse(wanted, &listen, NULL) != LUMI_OK)
         return;
     secure->listener = g_socket_listener_new();
     if (!bind_all(secure, &listen, &failed)) {
         if (!secure->said)
-            g_warning("HTTP: listen on '%s': %s", where, failed->message);
+            g_warning("HTTP: listen on '%s': %s", wanted, failed->message);
         secure->said = true;
         g_clear_object(&secure->listener);
         return;
     }
+    g_strlcpy(secure->host, strcmp(listen.host, "*") ? listen.host : "", sizeof secure->host);
     secure->said = false;
     secure->cancellable = g_cancellable_new();
     accept_next(secure);
@@ -368,14 +370,26 @@ void lumi_api_secure_tick(struct lumi_api_door *door)
 
 /* ---- as it is told ---- */
 
+static int where(const struct lumi_api_secure *secure, char address[LUMI_ADDRESSES_MAX][LUMI_ADDRESS_TEXT])
+{
+    if (!secure->listener)
+        return 0;
+    if (!secure->host[0])
+        return lumi_addresses(address);
+    g_strlcpy(address[0], secure->host, LUMI_ADDRESS_TEXT);
+    return 1;
+}
+
+static char *make_url(const struct lumi_api_secure *secure, const char *address)
+{
+    return g_strdup_printf(strchr(address, ':') ? "https://[%s]:%d/" : "https://%s:%d/", address, secure->port);
+}
+
 char *lumi_api_secure_url(const struct lumi_api_door *door)
 {
     char address[LUMI_ADDRESSES_MAX][LUMI_ADDRESS_TEXT];
 
-    if (!door->secure->listener || lumi_addresses(address) < 1)
-        return NULL;
-    return g_strdup_printf(strchr(address[0], ':') ? "https://[%s]:%d/" : "https://%s:%d/", address[0],
-                           door->secure->port);
+    return where(door->secure, address) > 0 ? make_url(door->secure, address[0]) : NULL;
 }
 
 const char *lumi_api_secure_fingerprint(const struct lumi_api_door *door)
@@ -386,14 +400,13 @@ const char *lumi_api_secure_fingerprint(const struct lumi_api_door *door)
 void lumi_api_secure_put(const struct lumi_api_door *door, JsonBuilder *builder)
 {
     char address[LUMI_ADDRESSES_MAX][LUMI_ADDRESS_TEXT];
-    int count = door->secure->listener ? lumi_addresses(address) : 0;
+    int count = where(door->secure, address);
 
     lumi_api_put_object(builder, "secure");
     lumi_api_put_bool(builder, "listening", door->secure->listener != NULL);
     lumi_api_put_array(builder, "urls");
     for (int i = 0; i < count; i++) {
-        g_autofree char *url = g_strdup_printf(strchr(address[i], ':') ? "https://[%s]:%d/" : "https://%s:%d/",
-                                               address[i], door->secure->port);
+        g_autofree char *url = make_url(door->secure, address[i]);
         json_builder_add_string_value(builder, url);
     }
     json_builder_end_array(builder);
@@ -422,14 +435,14 @@ bool lumi_api_is_tls(const struct lumi_http *http, SoupServerMessage *message)
 
 int lumi_api_secure_create(struct lumi_api_door *door, struct lumi_error *error)
 {
-    const char *where = door->http->options.secure;
+    const char *wanted = door->http->options.secure;
     struct lumi_api_listen listen;
     struct look *look;
 
     door->secure = g_new0(struct lumi_api_secure, 1);
     door->secure->door = door;
-    if (where && *where)
-        LUMI_TRY(lumi_api_listen_parse(where, &listen, error));
+    if (wanted && *wanted)
+        LUMI_TRY(lumi_api_listen_parse(wanted, &listen, error));
     if (!door->folder)
         return LUMI_OK;
     look = make_look(door);

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define BODY_MAX (1 << 20)
-#define CONNECTIONS_MAX 256
+#define CONNECTIONS_MAX 512
 #define CONNECTIONS_PEER 64
 #define SESSION_IDLE_NS (24 * 3600 * INT64_C(1000000000))
 #define SESSION_MOST_NS (14 * 86400 * INT64_C(1000000000))

@@ -24,7 +24,7 @@ struct lumi_http_options {
     const char *folder;                       /* where captures are kept, for /api/v1/captures; may be NULL */
     const char *preview;                      /* the command that draws the light field so far; NULL: none */
     size_t body_max;                          /* of a request (1 MiB) */
-    int connections_max;                      /* of which connections_peer are kept for this computer (256) */
+    int connections_max;                      /* of which connections_peer are kept for this computer (512) */
     int connections_peer;                     /* of one address, or IPv6 network of 64 bits (64) */
     struct lumi_engine *engine;
     struct lumi_handover *handover;    /* may be NULL */

@@ -98,8 +98,12 @@ static void all_connections_are_bounded_and_a_closed_one_makes_room(void **state
 {
     int fds[ALL + 1], again;
 
-    for (int i = 0; i <= ALL; i++)
+    for (int i = 0; i < ALL; i++) {
         fds[i] = connect_as(*state, 2 + i);
+        ask_on(fds[i], "/api/v1/capture");
+        expect_answer(fds[i], 200);
+    }
+    fds[ALL] = connect_as(*state, 2 + ALL);
     expect_refusal(fds[ALL]);
     close(fds[3]);
     turn_the_loop();
@@ -110,6 +114,31 @@ static void all_connections_are_bounded_and_a_closed_one_makes_room(void **state
     for (int i = 0; i <= ALL; i++)
         if (i != 3)
             close(fds[i]);
+}
+
+static void who_never_was_let_in_gives_way_to_who_comes(void **state)
+{
+    int fds[ALL + 3];
+
+    for (int i = 0; i < ALL; i++)
+        fds[i] = connect_as(*state, 2 + i);
+    for (int i = 1; i < ALL; i++) { /* the first has asked nothing; the second what nobody may */
+        fixture_send(fds[i], i == 1 ? "GET /api/v1/capture HTTP/1.1\r\nHost: evil.example\r\n\r\n" : "",
+                     i == 1 ? strlen("GET /api/v1/capture HTTP/1.1\r\nHost: evil.example\r\n\r\n") : 0);
+        if (i > 1)
+            ask_on(fds[i], "/api/v1/capture");
+        expect_answer(fds[i], i == 1 ? 421 : 200);
+    }
+    for (int i = ALL; i < ALL + 2; i++) {
+        fds[i] = connect_as(*state, 2 + i);
+        ask_on(fds[i], "/api/v1/capture");
+        expect_answer(fds[i], 200);
+        expect_end(fds[i - ALL]);
+    }
+    fds[ALL + 2] = connect_as(*state, 2 + ALL + 2);
+    expect_refusal(fds[ALL + 2]);
+    for (int i = 0; i < ALL + 3; i++)
+        close(fds[i]);
 }
 
 static void who_was_answered_and_has_left_makes_room(void **state)
@@ -193,9 +222,13 @@ int main(void)
 {
 #define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, fixture_tear_down)
     const struct CMUnitTest tests[] = {
-        CASE(one_peer_has_a_share_of_the_connections),  CASE(all_connections_are_bounded_and_a_closed_one_makes_room),
-        CASE(who_was_answered_and_has_left_makes_room), CASE(who_says_nothing_is_hung_up_on),
-        CASE(who_listens_to_events_may_be_silent),      CASE(listening_goes_on_after_the_descriptors_had_run_out),
+        CASE(one_peer_has_a_share_of_the_connections),
+        CASE(all_connections_are_bounded_and_a_closed_one_makes_room),
+        CASE(who_never_was_let_in_gives_way_to_who_comes),
+        CASE(who_was_answered_and_has_left_makes_room),
+        CASE(who_says_nothing_is_hung_up_on),
+        CASE(who_listens_to_events_may_be_silent),
+        CASE(listening_goes_on_after_the_descriptors_had_run_out),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

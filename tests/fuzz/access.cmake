@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_access FOLDERS access base)
