@@ -267,6 +267,7 @@ int lumi_api_door_create(struct lumi_http *http, struct lumi_api_door **door, st
     struct lumi_api_door *made = *door = g_new0(struct lumi_api_door, 1);
 
     made->http = http;
+    made->people = made->told = 1; /* who comes has seen none */
     made->folder = g_strdup(http->options.access);
     made->parties = g_ptr_array_new_with_free_func(g_free);
     made->streams = g_ptr_array_new();

@@ -37,7 +37,7 @@ struct lumi_api_door {
     struct lumi_attempts *attempts;
     struct lumi_api_worker *worker; /* passwords, and files: nobody's stop waits for either */
     GPtrArray *parties, *streams;
-    uint64_t people; /* number of what was told of them last */
+    uint64_t people, told; /* changes among them; those that were told, at most once a second */
     char *folder, *users_file;
     char local[LUMI_SECRET_TEXT]; /* what `lumi` on this computer shows; "": it is not kept */
     GSource *tick;

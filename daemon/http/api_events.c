@@ -14,7 +14,6 @@
 #include <string.h>
 
 #define RING 2048
-#define LISTENERS 256
 #define BLOCK_BYTES 32768
 #define TICK_MS 500
 #define PING_NS (15 * 1000000000LL)
@@ -464,7 +463,7 @@ void lumi_api_serve_events(struct lumi_http *http, SoupServerMessage *message, c
     struct listener *listener;
 
     (void)body;
-    if (events->listeners->len >= LISTENERS) {
+    if ((int)events->listeners->len >= http->options.listeners_max) {
         lumi_api_send_problem(message, 503, "limit", "too many listen to the events already");
         return;
     }

@@ -66,6 +66,7 @@ void lumi_api_people_tick(struct lumi_api_door *door)
             g_ptr_array_remove_index(door->parties, i - 1);
             door->people++;
         }
+    door->told = door->people;
 }
 
 /* ---- streams ---- */
@@ -148,7 +149,7 @@ void lumi_api_people_put(struct lumi_http *http, SoupServerMessage *message, Jso
 
 uint64_t lumi_api_people_number(const struct lumi_http *http)
 {
-    return http->door->people;
+    return http->door->told;
 }
 
 void lumi_api_people_finish(struct lumi_api_door *door)

@@ -7,6 +7,7 @@
 #define BODY_MAX (1 << 20)
 #define CONNECTIONS_MAX 512
 #define CONNECTIONS_PEER 64
+#define LISTENERS_MAX 256
 #define SESSION_IDLE_NS (24 * 3600 * INT64_C(1000000000))
 #define SESSION_MOST_NS (14 * 86400 * INT64_C(1000000000))
 
@@ -17,6 +18,7 @@ void lumi_http_options_init(struct lumi_http_options *options)
     options->body_max = BODY_MAX;
     options->connections_max = CONNECTIONS_MAX;
     options->connections_peer = CONNECTIONS_PEER;
+    options->listeners_max = LISTENERS_MAX;
     options->session_idle_ns = SESSION_IDLE_NS;
     options->session_most_ns = SESSION_MOST_NS;
 }

@@ -26,6 +26,7 @@ struct lumi_http_options {
     size_t body_max;                          /* of a request (1 MiB) */
     int connections_max;                      /* of which connections_peer are kept for this computer (512) */
     int connections_peer;                     /* of one address, or IPv6 network of 64 bits (64) */
+    int listeners_max;                        /* to the events (256) */
     struct lumi_engine *engine;
     struct lumi_handover *handover;    /* may be NULL */
     bool processes;                    /* the hand-over has a command to start */

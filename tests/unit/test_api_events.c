@@ -179,9 +179,13 @@ static void who_takes_nothing_for_a_minute_is_hung_up_on(void **state)
 
 static void too_many_listeners_are_refused(void **state)
 {
+    struct fixture *fixture = *state;
     int fds[33];
     GString *got;
 
+    lumi_http_stop(fixture->http);
+    fixture->options.listeners_max = 32;
+    fixture_start(fixture);
     for (int i = 0; i < 32; i++) {
         fds[i] = listen_from(*state, NULL, "retry", &got);
         g_string_free(got, TRUE);
