@@ -42,7 +42,7 @@ export function sessionsOffered() {
 
 // The code of a QR link is used once and taken out of the address, so that no history or bookmark keeps it.
 function codeOfAddress() {
-    const found = /^#pair=([\w-]{4,64})$/.exec(location.hash);
+    const found = /^#code=([\w-]{4,64})$/.exec(location.hash);
 
     if (found)
         history.replaceState(null, "", location.pathname + location.search);
