@@ -23,6 +23,7 @@ const actions = [
     { name: "jog", in: [...RESTING, ...WAITING], moves: true, call: jog },
     { name: "clear", in: null, call: clear },
 ];
+const LATER_MS = 800; // what the board makes of it is known a little later
 const QUICK = ["pause", "resume"];
 
 let unfollow = null;
@@ -60,6 +61,7 @@ async function send(name, body, options) {
         if (capture?.state)
             store.set("capture", { ...store.get("capture"), ...capture });
         refresh();
+        setTimeout(refresh, LATER_MS);
         return true;
     } catch (error) {
         notice.error(error, error.word === "busy" ? ` ${t("move.busy")}` : "");
@@ -208,8 +210,18 @@ export function mount(root) {
         facts(numbers);
     };
 
+    const fold = () => {
+        root.classList.remove("open");
+        more.setAttribute("aria-expanded", "false");
+    };
+
     unfollow?.();
-    unfollow = store.on(["capture", "rig", "disk", "estop", "session", "connection"], update);
+    addEventListener("hashchange", fold);
+    const unstore = store.on(["capture", "rig", "disk", "estop", "session", "connection"], update);
+    unfollow = () => {
+        removeEventListener("hashchange", fold);
+        unstore();
+    };
     notice = noticeBox();
     fill(root, h("div", { class: "quick" }, quick.map((one) => one.element), more),
         h("div", { id: "control-panel", class: "stack" }, h("h2", {}, t("control")), bar, numbers, none, notice.element,

@@ -98,11 +98,11 @@ async function listen() {
 
     if (lastId)
         headers["Last-Event-ID"] = lastId;
-    abort = new AbortController();
-    const timer = setTimeout(() => abort.abort(), PROBE_MS * 2);
-    const answer = await fetch("/api/v1/events", { headers, signal: abort.signal, cache: "no-store" });
+    const mine = abort = new AbortController();
+    const timer = setTimeout(() => mine.abort(), PROBE_MS * 2);
+    const answer = await fetch("/api/v1/events", { headers, signal: mine.signal, cache: "no-store" })
+        .finally(() => clearTimeout(timer));
 
-    clearTimeout(timer);
     if (!answer.ok)
         throw new ApiError(answer.status, "events", answer.statusText);
     heard = Date.now();
