@@ -37,6 +37,8 @@ function state() {
 export function whyNone() {
     if (store.get("connection").state !== "open")
         return t("why.connection");
+    if (!store.get("session")?.you)
+        return t("why.session");
     return mayOperate() ? "" : t("why.watch");
 }
 

@@ -98,7 +98,9 @@ export function bytes(value) {
     return `${number(value, unit > 0 && Math.abs(value) < 100 ? 1 : 0)} ${units[unit]}`;
 }
 
-// Seconds as 12 s, 4:05 min, 1:02:03 h.
+const DAYS_FROM = 2 * 86400;
+
+// Seconds as 12 s, 4:05 min, 1:02:03 h, 12 days.
 export function duration(seconds) {
     if (seconds === null || seconds === undefined || !Number.isFinite(seconds))
         return t("unknown");
@@ -109,6 +111,8 @@ export function duration(seconds) {
         return `${all} s`;
     if (all < 3600)
         return `${Math.floor(all / 60)}:${two(all % 60)} min`;
+    if (all >= DAYS_FROM)
+        return t("days", { n: Math.floor(all / 86400) });
     return `${Math.floor(all / 3600)}:${two(Math.floor(all / 60) % 60)}:${two(all % 60)} h`;
 }
 

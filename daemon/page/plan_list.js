@@ -1,7 +1,7 @@
 // Plans to choose from: those lumid has to begin with, and those kept in this browser.
 import { get, post } from "./api.js";
 import { h } from "./dom.js";
-import { bytes, duration, number, t } from "./i18n.js";
+import { bytes, duration, has, number, t } from "./i18n.js";
 import { kept, store } from "./store.js";
 import { planName } from "./plan_text.js";
 
@@ -27,11 +27,18 @@ export async function loadPlans() {
     return offered;
 }
 
+// In the page's language, where it is one that every lumid knows.
+function titleOf(plan) {
+    const title = has(`planTitle.${plan.name}`) ? t(`planTitle.${plan.name}`) : plan.title;
+
+    return title ? `${plan.name} – ${title}` : plan.name;
+}
+
 // [{key, name, text}] under the two headings, and what was edited but is in neither.
 function groups() {
     return [
-        [t("plans.offered"), (offered ?? []).map((one) => ({ key: `rig:${one.name}`, title: one.title ? `${one.name} – ${one.title}`
-            : one.name, name: one.name, text: one.text }))],
+        [t("plans.offered"), (offered ?? []).map((one) => ({ key: `rig:${one.name}`, title: titleOf(one), name: one.name,
+            text: one.text }))],
         [t("plans.own"), ownPlans().map((one) => ({ key: `own:${one.name}`, title: one.name, name: one.name, text: one.text }))],
     ];
 }
@@ -88,6 +95,7 @@ export function planFacts(found) {
 
     return h("dl", { class: "facts", test: "plan-facts" },
         row("plan.time", duration(found.seconds)),
+        row("plan.grid", found.rows && found.columns ? t("plan.gridOf", { rows: found.rows, columns: found.columns }) : null),
         row("plan.shots", number(found.shots)),
         row("plan.frames", number(found.frames)),
         row("plan.bytes", bytes(found.bytes)),
@@ -97,8 +105,9 @@ export function planFacts(found) {
         row("plan.nearest", metres(found.nearest_sharp_m)));
 }
 
-export function problemList(problems) {
-    return h("ul", { class: "problems" }, problems.map((problem) => h("li", { test: "plan-problem",
+// `kind`: "problem", or "warning", with which it can be run all the same.
+export function problemList(problems, kind = "problem") {
+    return h("ul", { class: "problems", data: { kind } }, (problems ?? []).map((problem) => h("li", { test: `plan-${kind}`,
         data: { line: problem.line ?? "" } }, problem.line ? t("plan.line", { line: String(problem.line), text: problem.text })
-        : problem.text)));
+        : problem.text ?? problem)));
 }

@@ -1,6 +1,7 @@
 // The stream of events (docs/api.md), read by fetch rather than by EventSource: so the comments that say "still here"
 // and the status of a refusal are seen, and the id of the last event outlives every new attempt.
 import { get, ApiError } from "./api.js";
+import { eventParser } from "./event_parser.js";
 import { store } from "./store.js";
 
 const SILENT_MS = 4000; // nothing heard for so long: lumid is asked whether it is there
@@ -47,39 +48,6 @@ function connection(state) {
         emit(state);
 }
 
-// Fields of one event after another, as the HTML Living Standard (9.2.6) has them.
-export function parser(tell) {
-    let rest = "", kind = "", data = [], id;
-
-    const line = (text) => {
-        if (text === "") {
-            if (data.length)
-                tell(kind || "message", data.join("\n"), id);
-            kind = "";
-            data = [];
-            return;
-        }
-        const colon = text.indexOf(":");
-        const name = colon < 0 ? text : text.slice(0, colon);
-        const value = colon < 0 ? "" : text.slice(colon + 1).replace(/^ /, "");
-
-        if (name === "event")
-            kind = value;
-        else if (name === "data")
-            data.push(value);
-        else if (name === "id" && !value.includes("\0"))
-            id = value;
-    };
-    return (text) => {
-        rest += text;
-        // A carriage return at the end may be the first half of a line's end.
-        const lines = rest.split(/\r\n|\n|\r(?!$)/);
-        rest = lines.pop();
-        for (const one of lines)
-            line(one);
-    };
-}
-
 function told(kind, text, id) {
     let data;
 
@@ -109,7 +77,7 @@ async function listen() {
     connection("open");
     const reader = answer.body.getReader();
     const decoder = new TextDecoder();
-    const feed = parser(told);
+    const feed = eventParser(told);
     for (;;) {
         const { value, done } = await reader.read();
         if (done)

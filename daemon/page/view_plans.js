@@ -75,6 +75,7 @@ function changed() {
     const text = parts.text.value;
 
     choosePlan({ key: store.get("plan")?.key ?? "", name: planName(text) || t("plans.unnamed"), text });
+    choose();
     clearTimeout(timer);
     timer = setTimeout(check, TYPED_MS);
 }
@@ -94,7 +95,7 @@ function showFound(found) {
     parts.said.dataset.runnable = String(found.runnable);
     setText(parts.verdict, found.runnable ? t("plan.runnable") : t("plan.notRunnable"));
     parts.verdict.dataset.kind = found.runnable ? "good" : "bad";
-    fill(parts.found, problemList(found.problems ?? []), found.shots || found.seconds ? planFacts(found) : null);
+    fill(parts.found, problemList(found.problems), problemList(found.warnings, "warning"), found.shots || found.seconds ? planFacts(found) : null);
     showLines(found.problems ?? []);
 }
 

@@ -143,7 +143,8 @@ async function showPlan() {
     try {
         const found = await checkPlan(plan.text);
         if (parts && plan === store.get("plan"))
-            fill(parts.facts, found.runnable ? planFacts(found) : problemList(found.problems));
+            fill(parts.facts, problemList(found.problems), problemList(found.warnings, "warning"),
+                found.runnable ? planFacts(found) : null);
     } catch (error) {
         if (parts && error.word !== "absent")
             parts.notice.error(error);
