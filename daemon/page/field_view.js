@@ -117,7 +117,7 @@ export class FieldView {
     // ---- pictures ----
 
     ask() {
-        if (!this.stale || this.under || !this.visible || document.hidden || !this.some() || this.stop.signal.aborted)
+        if (!this.stale || this.under || !this.visible || document.hidden || this.lookTimer || !this.some() || this.stop.signal.aborted)
             return;
         this.stale = false;
         this.under = true;
@@ -205,6 +205,8 @@ export class FieldView {
     }
 
     news(data) {
+        clearTimeout(this.lookTimer);
+        this.lookTimer = 0;
         this.tell(data);
         this.newsTimer ||= setTimeout(() => {
             this.newsTimer = 0;
@@ -215,6 +217,7 @@ export class FieldView {
 
     async look() {
         clearTimeout(this.lookTimer);
+        this.lookTimer = 0;
         try {
             this.tell(await get("/api/v1/field", { quiet: true }));
         } catch (error) {
@@ -223,9 +226,11 @@ export class FieldView {
         }
         this.stale = true;
         this.ask();
-        if (!this.shown)
+        if (!this.some())
             this.lookLater();
     }
+
+    // Whoever was refused does not ask with every move of a finger.
 
     lookLater() {
         clearTimeout(this.lookTimer);
