@@ -90,11 +90,11 @@ static void come_back(struct lumi_api_letter *letter, bool dropped)
     struct call *call = (struct call *)letter;
 
     if (!dropped && !call->gone) {
+        soup_server_message_unpause(call->message); /* first: who answers later pauses it again */
         if (call->route->serve)
             call->route->serve(call->http, call->message, &call->body);
         else
             lumi_api_send(call->message, &call->answer);
-        soup_server_message_unpause(call->message);
     }
     end_call(call);
 }
