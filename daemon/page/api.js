@@ -44,8 +44,10 @@ async function problem(answer) {
     } catch { /* no problem document: the status says it */ }
     const word = String(found.type ?? "").split(":").pop() || `status${answer.status}`;
 
-    return new ApiError(answer.status, answer.status === 404 && word === "path" ? "absent" : word,
+    const error = new ApiError(answer.status, answer.status === 404 && word === "path" ? "absent" : word,
         found.detail ?? `${answer.status} ${answer.statusText}`);
+    error.after = Number(answer.headers.get("Retry-After")) || 0; // seconds
+    return error;
 }
 
 async function once(method, path, body, options) {

@@ -55,12 +55,24 @@ async function logIn(body) {
         throw new ApiError(401, "login", "");
 }
 
-function limited(error, button) {
-    // What lumid says of how long is in the detail; the button is given back after a while in any case.
-    button.disabled = true;
-    setTimeout(() => {
-        button.disabled = false;
-    }, error.word === "limit" ? 3000 : 0);
+// After too many wrong ones nothing is sent until lumid would look at it again, and how long that is is told.
+function limited(error, button, said) {
+    const until = Date.now() + error.after * 1000;
+    const tick = () => {
+        const left = Math.ceil((until - Date.now()) / 1000);
+
+        button.disabled = left > 0 && button.isConnected;
+        if (!button.disabled) {
+            clearInterval(timer);
+            if (error.after)
+                said.clear();
+            return;
+        }
+        said.say("bad", t("login.wait", { time: duration(left) }));
+    };
+    const timer = setInterval(tick, 1000);
+
+    tick();
 }
 
 function form(fields, test, said, done) {
@@ -81,7 +93,7 @@ function form(fields, test, said, done) {
             const password = event.target.querySelector("[name=password], [name=code]");
             password.value = "";
             password.focus();
-            limited(error, button);
+            limited(error, button, said);
         }
     } } }, fields, h("div", { class: "row end" }, button));
 }
@@ -133,22 +145,27 @@ async function refused(error) {
     return openLogin(error.word === "csrf" || !store.get("capture") ? "" : t("login.ranOut"));
 }
 
-export async function startSession() {
+// Logs in by the code of the address, where it has one: false where it has none.
+export async function pairByAddress() {
     const code = codeOfAddress();
 
+    if (!code)
+        return false;
+    try {
+        await logIn({ code });
+    } catch (error) {
+        await fetchSession().catch(() => {});
+        if (!store.get("session")?.you)
+            await openLogin(errorWords(error));
+    }
+    return true;
+}
+
+export async function startSession() {
     onLogin(refused);
     document.addEventListener("lumi-login", () => openLogin(t("login.ranOut")));
-    if (code) {
-        try {
-            await logIn({ code });
-            return;
-        } catch (error) {
-            await fetchSession().catch(() => {});
-            if (!store.get("session")?.you)
-                await openLogin(errorWords(error));
-            return;
-        }
-    }
+    if (await pairByAddress())
+        return;
     // Where lumid does not answer (yet) the stream finds out when it does, and a session that is lacking is asked for.
     await fetchSession().catch(() => {});
 }

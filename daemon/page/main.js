@@ -3,7 +3,7 @@ import { get } from "./api.js";
 import * as control from "./control.js";
 import { fill, h, setText } from "./dom.js";
 import { clock, loadTexts, onLanguage, t } from "./i18n.js";
-import { fetchSession, requireSession, startSession } from "./login.js";
+import { fetchSession, pairByAddress, requireSession, startSession } from "./login.js";
 import { mountMenu } from "./menu.js";
 import { followState, refresh } from "./state.js";
 import { store } from "./store.js";
@@ -133,7 +133,7 @@ async function start() {
     });
     await startSession();
     route({ focus: false });
-    addEventListener("hashchange", () => route());
+    addEventListener("hashchange", async () => await pairByAddress() || route());
     await requireSession();
     stream.start();
     get("/api/v1/profile", { quiet: true }).then((profile) => store.set("profile", profile), () => {});
