@@ -184,7 +184,8 @@ char *engine_copy(const char *text)
     return copy;
 }
 
-void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, int camera, const char *text)
+static void tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, int camera, const char *what,
+                 const char *text)
 {
     struct lumi_engine_told told = {.kind = kind,
                                     .number = ++e->told_number,
@@ -196,6 +197,7 @@ void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, in
 
     if (!e->ports.told)
         return;
+    snprintf(told.what, sizeof told.what, "%s", what);
     snprintf(told.text, sizeof told.text, "%s", text ? text : "");
     if (kind == LUMI_TALE_SHOT)
         told.lost = e->account_shots && e->account_shots[shot].state == SHOT_LOST;
@@ -214,6 +216,11 @@ void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, in
     if (kind == LUMI_TALE_CHECK)
         told.shot = -1;
     e->ports.told(e->ports.context, &told);
+}
+
+void engine_tell(struct lumi_engine *e, enum lumi_engine_tale kind, int shot, int camera, const char *text)
+{
+    tell(e, kind, shot, camera, "", text);
 }
 
 void engine_state(struct lumi_engine *e, enum lumi_engine_state state, const char *format, ...)
@@ -239,7 +246,7 @@ void engine_incident(struct lumi_engine *e, int camera, const char *kind, const 
     va_start(list, format);
     vsnprintf(text, sizeof text, format, list);
     va_end(list);
-    engine_tell(e, LUMI_TALE_INCIDENT, -1, camera, text);
+    tell(e, LUMI_TALE_INCIDENT, -1, camera, kind, text);
     engine_incident_row(e, camera, kind, text);
 }
 

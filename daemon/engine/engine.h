@@ -106,7 +106,7 @@ enum lumi_engine_tale {
     LUMI_TALE_CHECK,     /* of the preflight: `check` */
     LUMI_TALE_SHOT,      /* `shot`; `lost` */
     LUMI_TALE_FRAME,     /* `shot`, `camera`, `frame_state`; `text` the reason, if any */
-    LUMI_TALE_INCIDENT,  /* `text`, `camera` or −1 */
+    LUMI_TALE_INCIDENT,  /* `what`, `text`, `camera` or −1 */
     LUMI_TALE_SEALED     /* `text`: the capture */
 };
 struct lumi_engine_check;
@@ -121,6 +121,7 @@ struct lumi_engine_told {
     int frame;   /* FRAME: as lumi_engine_frame counts */
     char letter; /* FRAME: as there */
     enum lumi_judge_fault fault;
+    char what[16]; /* INCIDENT: in a word, as it is in the capture; may be empty */
     char text[512];
 };
 

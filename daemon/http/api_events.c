@@ -182,6 +182,8 @@ static void describe(JsonBuilder *builder, const struct lumi_engine_told *told, 
         lumi_api_put_text(builder, "letter", letter);
         lumi_api_put_text(builder, "class", lumi_judge_fault_name(told->fault));
     }
+    if (told->kind == LUMI_TALE_INCIDENT && told->what[0])
+        lumi_api_put_text(builder, "what", told->what);
     if (told->kind != LUMI_TALE_SHOT && told->kind != LUMI_TALE_CHECK)
         lumi_api_put_text(builder, "text", told->text);
 }

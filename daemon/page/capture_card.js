@@ -132,6 +132,7 @@ export class CaptureCard {
             button.title = why[name];
         }
         this.buttons.retake.hidden = !missingOf(capture);
+        this.download.hidden = isNow;
         setText(this.why, watch || busy || (!captures.configured ? why.process : ""));
     }
 }

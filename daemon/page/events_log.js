@@ -1,6 +1,6 @@
 // What happened, for people: of all events those that somebody would want to read, the newest first, also after the page was
 // loaded anew. Thousands of frames that went well are told by the sphere, not here.
-import { t } from "./i18n.js";
+import { has, t } from "./i18n.js";
 import { KINDS } from "./sphere.js";
 import * as stream from "./stream.js";
 import { checkTitle, saidWords, stateWord } from "./words.js";
@@ -30,6 +30,7 @@ function save() {
     } catch { /* a browser that keeps nothing begins anew every time */ }
 }
 
+const GOOD_NEWS = ["homed", "recovered"];
 const BAD_STATES = ["interrupted", "failed", "red"];
 
 // The level of what is worth telling; null: it is not.
@@ -43,8 +44,8 @@ function level(kind, data) {
         return data.lost ? "warn" : null;
     case "frame": // one that does not come is told as an incident too
         return ["f", "c", "r"].includes(data.letter ?? (data.state === "rejected" ? "r" : "")) ? "warn" : null;
-    case "incident":
-        return "warn";
+    case "incident": // a lost shot is told as one too
+        return data.what === "lost" ? null : GOOD_NEWS.includes(data.what) ? "info" : "warn";
     case "sealed":
         return "good";
     case "gap":
@@ -65,6 +66,15 @@ function level(kind, data) {
 const kindOf = (letter) => KINDS.find((kind) => kind.letter === letter)?.name ?? "rejected";
 const last = (path) => String(path ?? "").split("/").filter(Boolean).pop() ?? "";
 
+// What it is in the page's language; lumid's own line after it has the figures.
+function incidentWords({ what, camera, text }) {
+    const key = `incident.${what}`;
+
+    if (what && has(key))
+        return t(camera ? "event.incident.camera" : "event.incident", { camera, what: t(key), text });
+    return camera ? t("event.camera", { camera, text }) : text;
+}
+
 export function entryWords({ kind, data }) {
     switch (kind) {
     case "state":
@@ -76,7 +86,7 @@ export function entryWords({ kind, data }) {
     case "frame":
         return t("event.frame", { shot: String(data.shot), camera: data.camera, kind: t(`kind.${kindOf(data.letter)}`), text: data.text ?? "" });
     case "incident":
-        return data.camera ? t("event.incident.camera", { camera: data.camera, text: data.text }) : data.text;
+        return incidentWords(data);
     case "sealed":
         return t("event.sealed", { capture: last(data.text) });
     case "gap":

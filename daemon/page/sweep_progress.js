@@ -2,7 +2,6 @@
 import { h, setText } from "./dom.js";
 import { bytes, number, t } from "./i18n.js";
 import { store } from "./store.js";
-import { saidWords, stateWord } from "./words.js";
 import { aboutTime } from "./words_live.js";
 
 const AT_WORK = ["homing", "arming", "sweeping", "pausing", "paused", "interrupted", "draining"];
@@ -50,7 +49,7 @@ function writeDisk(disk, rate, capture, store_) {
 
 // {element, destroy}
 export function sweepProgress() {
-    const line = bar(), said = h("p", { class: "progress-said", test: "progress-said" }), text = h("p", { class: "progress-text" });
+    const line = bar(), said = h("p", { class: "progress-said", test: "progress-said" });
     const round = figure(t("progress.round"), "round"), time = figure(t("progress.time"), "time-left");
     const disk = figure(t("progress.disk"), "disk-left"), rate = figure(t("progress.rate"), "rate");
     const shots = figure(t("progress.shots"), "shots"), heat = figure(t("progress.heat"), "temperature");
@@ -63,7 +62,6 @@ export function sweepProgress() {
         const words = capture.frames ? t("progress.frames", { good, all: capture.frames, bad, stored }) : t("progress.none");
         line.set([good, stored, bad], capture.frames ?? 0, words);
         setText(said, words);
-        setText(text, capture.text ? t("progress.state", { state: stateWord(capture.state), text: saidWords(capture.text) }) : stateWord(capture.state));
         round.set(capture.frames ? capture.round > 0 ? t("progress.retake", { n: capture.round }) : t("progress.sweep") : "–");
         time.set(AT_WORK.includes(capture.state) ? aboutTime(capture.seconds_left) : "–");
         shots.set(capture.shots ? t("progress.of", { done: capture.fired, all: capture.shots }) : "–",
@@ -77,7 +75,7 @@ export function sweepProgress() {
     update();
     return {
         element: h("section", { class: "progress", "aria-labelledby": "progress-title" }, h("h2", { id: "progress-title" }, t("progress.title")),
-            text, line.element, said,
+            line.element, said,
             h("dl", { class: "figures big" }, [time, disk, rate, shots, round, heat].map((one) => one.element))),
         destroy: off,
     };

@@ -80,6 +80,23 @@ static void who_listens_is_told_what_happens_from_then_on(void **state)
     close(fd);
 }
 
+static void what_happened_is_told_in_a_word_too(void **state)
+{
+    struct lumi_engine_told told = {.kind = LUMI_TALE_INCIDENT, .camera = -1, .what = "late", .text = "it came late"};
+    struct fixture *fixture = *state;
+    GString *got;
+    int fd = listen_from(fixture, NULL, "event: progress", &got);
+
+    g_string_free(got, TRUE);
+    lumi_http_told(fixture->http, &told);
+    tell(fixture, "no word for it");
+    got = fixture_receive(fd, "no word for it");
+    assert_non_null(strstr(got->str, "\"what\":\"late\",\"text\":\"it came late\""));
+    assert_null(strstr(got->str, "\"what\":\"\""));
+    g_string_free(got, TRUE);
+    close(fd);
+}
+
 static void who_comes_back_gets_what_was_missed(void **state)
 {
     GString *got;
@@ -251,6 +268,7 @@ int main(void)
 #define CASE(name) cmocka_unit_test_setup_teardown(name, fixture_set_up, fixture_tear_down)
     const struct CMUnitTest tests[] = {
         CASE(who_listens_is_told_what_happens_from_then_on),
+        CASE(what_happened_is_told_in_a_word_too),
         CASE(who_comes_back_gets_what_was_missed),
         CASE(what_was_pushed_out_is_counted),
         CASE(who_sleeps_costs_nothing_and_is_told_what_it_missed),
