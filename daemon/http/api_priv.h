@@ -17,6 +17,7 @@ struct lumi_api_guard;
 struct lumi_api_live;
 struct lumi_api_pictures;
 struct lumi_api_door;
+struct lumi_api_shelf;
 struct lumi_http {
     struct lumi_http_options options; /* its strings are copies */
     GMainContext *context;            /* of the server's thread */
@@ -32,6 +33,7 @@ struct lumi_http {
     GPtrArray *refusals;
     struct lumi_api_live *live;
     struct lumi_api_pictures *pictures;
+    struct lumi_api_shelf *shelf;
     struct lumi_api_field_views *field; /* its lock is for both threads */
     /* In both: each has members of its own. */
     struct lumi_api_events *events;
@@ -73,13 +75,30 @@ struct lumi_api_route {
     const struct lumi_api_field *fields; /* of a POST's body, of a GET's query; NULL: none is read */
     /* In the engine's thread; its answer is sent if there is nothing else. NULL: the engine is not asked. */
     void (*call)(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
-    /* In the server's thread, after it. */
+    /* In the server's thread, after it, unless that has answered. */
     void (*serve)(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 };
 extern const struct lumi_api_route lumi_api_routes[]; /* path NULL ends it */
 
-void lumi_api_serve_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 void lumi_api_serve_devices(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+
+/* ---- captures on the disk (api_captures.c, api_shelf.h) ---- */
+
+int lumi_api_shelf_create(struct lumi_http *http, struct lumi_api_shelf **shelf, struct lumi_error *error);
+void lumi_api_shelf_close(
+    struct lumi_api_shelf *shelf); /* its threads end; then letters are dropped, then the rest goes */
+void lumi_api_shelf_destroy(struct lumi_api_shelf *shelf);
+void lumi_api_serve_captures(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_thumbnail(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_bundle(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+extern const struct lumi_api_field lumi_api_verify_fields[], lumi_api_delete_fields[];
+/* In the engine's thread: not what is under way. */
+void lumi_api_see_verify(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+void lumi_api_see_delete(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
+void lumi_api_serve_verify(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+void lumi_api_serve_delete(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
+/* "verified": what was found of the capture as this seal says it is, or null. From any thread. */
+void lumi_api_put_verified(JsonBuilder *builder, struct lumi_api_shelf *shelf, const char *name, const char *seal);
 
 /* What an operator wanted was taken (202: what comes of it is told by events), or not. */
 void lumi_api_answer_wish(struct lumi_http *http, struct lumi_api_answer *answer, int code,

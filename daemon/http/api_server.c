@@ -90,8 +90,8 @@ static void come_back(struct lumi_api_letter *letter, bool dropped)
     struct call *call = (struct call *)letter;
 
     if (!dropped && !call->gone) {
-        soup_server_message_unpause(call->message); /* first: who answers later pauses it again */
-        if (call->route->serve)
+        soup_server_message_unpause(call->message); /* first: who serves may want it to wait */
+        if (call->route->serve && !call->answer.status)
             call->route->serve(call->http, call->message, &call->body);
         else
             lumi_api_send(call->message, &call->answer);
@@ -255,6 +255,7 @@ static void copy_options(struct lumi_http *http, const struct lumi_http_options 
     http->options.secure = g_strdup(options->secure);
     http->options.host_name = g_strdup(options->host_name);
     http->options.folder = g_strdup(options->folder);
+    http->options.second_copy = g_strdup(options->second_copy);
     http->options.preview = g_strdup(options->preview);
 }
 
@@ -323,6 +324,7 @@ static int make_server(struct lumi_http *made, struct lumi_error *error)
     made->live = lumi_api_live_create(made);
     made->pictures = lumi_api_pictures_create(made);
     LUMI_GOTO(code, out, lumi_api_field_create(made, &made->field, error));
+    LUMI_GOTO(code, out, lumi_api_shelf_create(made, &made->shelf, error));
     made->guard = lumi_api_guard_create(made);
     soup_server_add_early_handler(made->server, NULL, on_early, made, NULL);
     soup_server_add_handler(made->server, NULL, on_request, made, NULL);
@@ -362,11 +364,13 @@ void lumi_http_stop(struct lumi_http *http)
         end_thread(http);
     g_main_context_push_thread_default(http->context);
     lumi_api_worker_destroy(http->worker);
+    lumi_api_shelf_close(http->shelf);
     lumi_api_door_close(http->door);
     lumi_api_post_destroy(http->to_engine);
     lumi_api_post_destroy(http->to_server);
     lumi_api_live_destroy(http->live);
     lumi_api_pictures_destroy(http->pictures);
+    lumi_api_shelf_destroy(http->shelf);
     lumi_api_field_destroy(http->field);
     lumi_api_events_destroy(http->events);
     lumi_api_door_destroy(http->door);
@@ -389,6 +393,7 @@ void lumi_http_stop(struct lumi_http *http)
     g_free((char *)http->options.secure);
     g_free((char *)http->options.host_name);
     g_free((char *)http->options.folder);
+    g_free((char *)http->options.second_copy);
     g_free((char *)http->options.preview);
     g_free(http);
 }

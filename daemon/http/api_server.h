@@ -22,6 +22,7 @@ struct lumi_http_options {
     const char *host_name; /* for the certificate; NULL: this computer's */
     int64_t session_idle_ns, session_most_ns; /* without use (24 hours); in all (14 days) */
     const char *folder;                       /* where captures are kept, for /api/v1/captures; may be NULL */
+    const char *second_copy;                  /* folder of the second copies; NULL: there are none */
     const char *preview;                      /* the command that draws the light field so far; NULL: none */
     size_t body_max;                          /* of a request (1 MiB) */
     int connections_max;                      /* of which connections_peer are kept for this computer (512) */

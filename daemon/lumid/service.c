@@ -342,6 +342,7 @@ static int start_http(struct lumi_service *service, struct lumi_error *error)
     options.session_most_ns = (int64_t)(config->session_most * 1e9);
     options.unix_us = http_unix_us;
     options.folder = config->engine.folder;
+    options.second_copy = config->second_copy[0] ? config->second_copy : NULL;
     options.preview = config->preview;
     options.engine = service->engine;
     options.handover = service->handover;

@@ -84,6 +84,8 @@ int lumi_capture_guard(struct lumi_capture *capture, struct lumi_error *error);
 int lumi_capture_guarded(struct lumi_capture *capture, int code, struct lumi_error *error);
 
 bool lumi_capture_sealed(const struct lumi_capture *capture);
+/* What a sealed capture is known by wherever it is: the SHA-256 of its tagmanifest-sha256.txt; "" for an open one. */
+int lumi_capture_seal_of(const char *path, char seal[65], struct lumi_error *error);
 /* The directory as it was opened (the .partial one while it is that); owned by the capture. */
 const char *lumi_capture_path(const struct lumi_capture *capture);
 

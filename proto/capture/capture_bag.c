@@ -220,3 +220,17 @@ int capture_unseal(struct lumi_capture *capture, struct lumi_error *error)
     }
     return LUMI_OK;
 }
+
+int lumi_capture_seal_of(const char *path, char seal[65], struct lumi_error *error)
+{
+    const int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    int code = LUMI_OK;
+
+    seal[0] = '\0';
+    if (fd < 0)
+        return lumi_fail_errno(error, path, "opening it");
+    if (faccessat(fd, CAPTURE_SEAL, F_OK, 0) == 0)
+        code = capture_hash_file(fd, CAPTURE_SEAL, seal, NULL, NULL, error);
+    close(fd);
+    return code;
+}
