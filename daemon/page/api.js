@@ -36,7 +36,8 @@ document.addEventListener("lumi-estop", () => {
         abort.abort("stopped");
 });
 
-async function problem(answer) {
+// What an answer that is none says, as an ApiError.
+export async function problem(answer) {
     let found = {};
 
     try {

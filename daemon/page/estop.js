@@ -98,6 +98,7 @@ async function press() {
 }
 
 button.addEventListener("click", press);
+button.dataset.ready = "yes";
 close.addEventListener("click", () => {
     presses++; // ends what is still being tried
     box.hidden = true;

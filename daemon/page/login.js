@@ -13,6 +13,7 @@ const LOCAL = { users: false, you: { name: "this computer", role: "operate", via
 
 let asking = null;
 let fallback = false;
+let fetching = null;
 
 function keep(session) {
     const before = store.get("session");
@@ -24,7 +25,7 @@ function keep(session) {
     return session;
 }
 
-export async function fetchSession() {
+async function fetchOnce() {
     try {
         return keep(await get("/api/v1/session", { quiet: true }));
     } catch (error) {
@@ -36,13 +37,27 @@ export async function fetchSession() {
     }
 }
 
+// Once, however many ask at a time.
+export function fetchSession() {
+    fetching ??= fetchOnce().finally(() => {
+        fetching = null;
+    });
+    return fetching;
+}
+
 export function sessionsOffered() {
     return !fallback;
 }
 
+const CODE = /^#(?:code|pair)=([\w-]{4,64})$/;
+
+export function hasCode() {
+    return CODE.test(location.hash);
+}
+
 // The code of a QR link is used once and taken out of the address, so that no history or bookmark keeps it.
 function codeOfAddress() {
-    const found = /^#code=([\w-]{4,64})$/.exec(location.hash);
+    const found = CODE.exec(location.hash);
 
     if (found)
         history.replaceState(null, "", location.pathname + location.search);

@@ -3,7 +3,7 @@ import { get } from "./api.js";
 import * as control from "./control.js";
 import { fill, h, setText } from "./dom.js";
 import { clock, loadTexts, onLanguage, t } from "./i18n.js";
-import { fetchSession, pairByAddress, requireSession, startSession } from "./login.js";
+import { fetchSession, hasCode, pairByAddress, requireSession, startSession } from "./login.js";
 import { mountMenu } from "./menu.js";
 import { followState, refresh } from "./state.js";
 import { store } from "./store.js";
@@ -97,11 +97,12 @@ function showFaults() {
 }
 
 function showConnection() {
-    const { state, since } = store.get("connection");
+    const { state, since, why } = store.get("connection");
     const element = document.getElementById("connection");
 
     element.dataset.state = state;
-    setText(element, state === "lost" ? t("connection.lost", { time: clock(since) }) : t(`connection.${state}`));
+    const lost = () => t("connection.lost", { time: clock(since) }) + (why ? ` (${why})` : "");
+    setText(element, state === "lost" ? lost() : t(`connection.${state}`));
     document.body.classList.toggle("lost", state === "lost");
 }
 
@@ -114,7 +115,11 @@ function shell() {
 }
 
 async function start() {
-    await loadTexts();
+    const texts = loadTexts();
+
+    if (!hasCode())
+        fetchSession().catch(() => {}); // meanwhile; what comes of it startSession looks at
+    await texts;
     onLanguage(() => {
         shell();
         enter(shown);
@@ -131,6 +136,9 @@ async function start() {
         refresh();
         fetchSession().catch(() => {}); // who was here may not be any more
     });
+    // A code in the address comes first: without it what the view asks for would be refused.
+    if (!hasCode())
+        route({ focus: false });
     await startSession();
     route({ focus: false });
     addEventListener("hashchange", async () => await pairByAddress() || route());

@@ -1,6 +1,6 @@
 // The stream of events (docs/api.md), read by fetch rather than by EventSource: so the comments that say "still here"
 // and the status of a refusal are seen, and the id of the last event outlives every new attempt.
-import { get, ApiError } from "./api.js";
+import { get, problem } from "./api.js";
 import { eventParser } from "./event_parser.js";
 import { store } from "./store.js";
 
@@ -40,11 +40,14 @@ function emit(name, data, id) {
         emit("*", { kind: name, data, id });
 }
 
-function connection(state) {
-    if (store.get("connection").state === state)
+// `why`: what lumid said, where it refused.
+function connection(state, why = "") {
+    const before = store.get("connection");
+
+    if (before.state === state && (before.why ?? "") === why)
         return;
-    store.set("connection", { state, since: new Date() });
-    if (state !== "connecting")
+    store.set("connection", { state, why, since: before.state === state ? before.since : new Date() });
+    if (state !== "connecting" && state !== before.state)
         emit(state);
 }
 
@@ -72,7 +75,7 @@ async function listen() {
         .finally(() => clearTimeout(timer));
 
     if (!answer.ok)
-        throw new ApiError(answer.status, "events", answer.statusText);
+        throw await problem(answer);
     heard = Date.now();
     connection("open");
     const reader = answer.body.getReader();
@@ -102,6 +105,7 @@ async function run() {
     running = true;
     while (wanted) {
         let began = Date.now();
+        let why = "";
 
         try {
             await listen();
@@ -112,14 +116,14 @@ async function run() {
                 await get("/api/v1/capture").then(() => {
                     began = 0; // at once
                 }, () => {});
-            } else if (error.status !== 0 && error.status !== undefined) {
-                console.warn(`events: ${error.status} ${error.message}`);
+            } else if (error.status) {
+                why = error.detail;
             }
         }
         abort = null;
         if (!wanted)
             break;
-        connection("lost");
+        connection("lost", why);
         wait = Date.now() - began > TRY_MOST_MS ? TRY_FIRST_MS : Math.min(wait * 2, TRY_MOST_MS);
         await pause(wait);
     }
