@@ -246,7 +246,6 @@ static void close_listener(struct lumi_api_secure *secure)
     g_socket_listener_close(secure->listener);
     g_clear_object(&secure->cancellable);
     g_clear_object(&secure->listener);
-    g_message("HTTP: this computer alone is answered: there is no user");
 }
 
 /* ---- what has been found ---- */
@@ -272,8 +271,10 @@ static void take(struct lumi_api_door *door, struct look *look)
         secure->certified_ns = lumi_api_now(door->http);
     if (door->users.count)
         open_listener(secure);
-    else
+    else if (secure->listener) {
         close_listener(secure);
+        g_message("HTTP: this computer alone is answered: there is no user");
+    }
 }
 
 static void looked(struct lumi_api_letter *letter, bool dropped)

@@ -454,6 +454,7 @@ int lumi_service_run(const struct lumi_service_options *options, struct lumi_err
     service->lock = -1;
     service->status = g_new0(struct lumi_engine_status, 1);
     signal(SIGPIPE, SIG_IGN);
+    lumi_service_log_libraries();
     int code = take_lock(service, error);
     if (code == LUMI_OK)
         code = lumi_inbox_create(&service->inbox, error);

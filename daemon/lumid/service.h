@@ -21,5 +21,7 @@ int lumi_service_run(const struct lumi_service_options *options, struct lumi_err
 
 /* One line to the journal or to standard error; `priority` as syslog's (3 error, 4 warning, 6 said). */
 void lumi_service_log(int priority, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* What the server and GLib say goes the same way, from now on. */
+void lumi_service_log_libraries(void);
 
 #endif

@@ -21,6 +21,12 @@ if(TARGET lumid)
     $<TARGET_FILE:lumid> $<TARGET_FILE:watch_pictures>)
   set_tests_properties(rig_pictures_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
   lumi_sanitized(rig_pictures_test)
+  # Many who only listen.
+  add_executable(hold_streams hold_streams.c)
+  target_link_libraries(hold_streams PRIVATE lumi_flags PkgConfig::libsoup_3_0 PkgConfig::json_glib_1_0)
+  add_test(NAME idle_streams_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/idle_streams_test.sh $<TARGET_FILE:lumi>
+    $<TARGET_FILE:lumid> $<TARGET_FILE:hold_streams>)
+  set_tests_properties(idle_streams_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS slow)
   # The daemon killed in the middle of its work; a hundred times only in `script/test all`.
   add_executable(capture_kept capture_kept.c)
   target_link_libraries(capture_kept PRIVATE lumi_flags lumi_capture lumi_base)
