@@ -45,7 +45,7 @@ if [ "${4:-}" = operate ]; then
     kill -TERM $streams
     wait $streams || fail "streams ended: $(cat streams)"
     cat streams
-    grep -q "200 of 200 open, 6 shots at least" streams || fail "not every stream was told of every shot"
+    grep -q "200 of 200 open, 12 shots at least" streams || fail "not every stream was told of every shot"
     exit 0
 fi
 
@@ -53,13 +53,13 @@ need_network
 rm -rf idle_streams_test.tmp
 mkdir idle_streams_test.tmp
 cd idle_streams_test.tmp
-"$lumi" sim rig object --rig arc:2x3:0.2 --size 48x48 --white 0.008 -o rig --port 8486 --own-network -- \
+"$lumi" sim rig object --rig arc:2x6:0.2 --size 48x48 --white 0.008 -o rig --port 8486 --own-network -- \
     sh "$here/idle_streams_test.sh" "$lumi" "$lumid" "$hold" operate || fail "the rig ended badly"
 count=0
 for capture in rig/captures/*.capture; do
     "$lumi" verify "$capture" >/dev/null || fail "the capture is not whole"
     "$lumi" info "$capture" >info.txt
-    grep -q " 12 stored" info.txt || fail "not all is there: $(cat info.txt)"
+    grep -q " 24 " info.txt || fail "not all is there: $(cat info.txt)"
     count=$((count + 1))
 done
 [ $count -eq 2 ] || fail "$count captures"
