@@ -5,10 +5,12 @@ import * as stream from "./stream.js";
 
 const EVERY_MS = 5000;
 const SOON_MS = 150;
+const LATER_MS = 1000;
 
 let asked = null;
 let again = false;
 let soon = null;
+let later = null;
 
 async function ask() {
     const status = await get("/api/v1/status");
@@ -42,6 +44,10 @@ export function refresh() {
 function refreshSoon() {
     clearTimeout(soon);
     soon = setTimeout(refresh, SOON_MS);
+    later ??= setTimeout(() => { // the board's own word on it comes a little after the event
+        later = null;
+        refresh();
+    }, LATER_MS);
 }
 
 function keep(event) {
