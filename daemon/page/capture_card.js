@@ -93,7 +93,7 @@ export class CaptureCard {
 
         this.running = now?.state === "running";
         if (this.running)
-            this.checked.set(t("verify.running", { done: now.done, all: now.total }), now.total ? now.done / now.total : NaN);
+            this.checked.set(t("verify.running", { done: bytes(now.done), all: bytes(now.total) }), now.total ? now.done / now.total : NaN);
         else if (now && !capture.verified)
             this.checked.set(t(`verify.${now.state}`, { time: "", text: now.text }), null, now.state);
         else if (capture.verified)
@@ -132,7 +132,7 @@ export class CaptureCard {
             button.title = why[name];
         }
         this.buttons.retake.hidden = !missingOf(capture);
-        this.download.hidden = isNow;
+        this.download.hidden = isNow || !capture.sealed;
         setText(this.why, watch || busy || (!captures.configured ? why.process : ""));
     }
 }

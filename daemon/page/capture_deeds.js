@@ -29,7 +29,7 @@ export function handOver(capture, notice) {
 }
 
 export async function retakeMissing(capture, notice) {
-    if (await askMove(t("retake.ask"), h("p", {}, t("capture.retake.what", { name: capture.title || capture.name })), t("retake.button")))
+    if (await askMove(t("retake.ask"), h("p", {}, t("capture.retake.what", { name: capture.title || capture.name })), t("retake.confirm")))
         await send(notice, "/api/v1/capture/retake", { capture: capture.name }, t("capture.retake.sent"), { moves: true });
 }
 
@@ -39,7 +39,7 @@ function choice(value, text, checked) {
 }
 
 // Deleting cannot be undone, so it wants what only somebody has who means it: the seal that `lumi verify` prints for a copy
-// elsewhere, or the capture's name, typed.
+// elsewhere, the rig's own second copy, or the capture's name, typed.
 class DeleteForm {
     constructor(capture) {
         const id = newId("delete");
@@ -54,11 +54,13 @@ class DeleteForm {
         this.said = h("p", { class: "warn", role: "alert" });
         this.element = h("div", {}, h("p", { class: "warn" }, t("delete.lost", { frames: capture.frames, size: bytes(capture.bytes) })),
             h("p", {}, t(capture.verified?.good ? "delete.verified" : "delete.unverified")),
-            h("fieldset", {}, h("legend", {}, t("delete.by")), choice("seal", t("delete.by.seal"), true), choice("word", t("delete.by.word"), false)),
+            h("fieldset", {}, h("legend", {}, t("delete.by")), choice("seal", t("delete.by.seal"), true),
+                choice("copy", t("delete.by.copy"), false), choice("word", t("delete.by.word"), false)),
             this.bySeal, this.byWord, this.said);
         this.element.addEventListener("change", () => this.change());
         if (!capture.sealed || !capture.seal) {
-            this.element.querySelector('[value="seal"]').disabled = true;
+            for (const by of ["seal", "copy"])
+                this.element.querySelector(`[value="${by}"]`).disabled = true;
             this.element.querySelector('[value="word"]').checked = true;
             this.change();
         }
@@ -78,6 +80,8 @@ class DeleteForm {
         const seal = this.seal.value.trim().toLowerCase(), word = this.word.value.trim();
         let why = "";
 
+        if (this.by() === "copy")
+            return { capture: this.capture.name, copy: true };
         if (this.by() === "seal")
             why = !/^[0-9a-f]{64}$/.test(seal) ? t("delete.seal.bad") : this.capture.seal && seal !== this.capture.seal ? t("delete.seal.other") : "";
         else

@@ -40,7 +40,7 @@ async function retake(notice, changed) {
     if (name)
         body.capture = name;
     const later = !RESTING.includes(store.get("capture")?.state);
-    if (!await askMove(t(later ? "retake.later" : "retake.ask"), question(), t("retake.button")))
+    if (!await askMove(t(later ? "retake.later" : "retake.ask"), question(), t("retake.confirm")))
         return;
     notice.say("info", t("sending"));
     try {
