@@ -321,7 +321,7 @@ const struct lumi_api_route lumi_api_routes[] = {
     {"/api/v1/cameras/{name}/last.jpg", "GET", LUMI_API_WATCH, NULL, NULL, lumi_api_serve_last},
     {"/api/v1/cameras/{name}/live", "GET", LUMI_API_WATCH, NULL, NULL, lumi_api_serve_live},
     {"/api/v1/field", "GET", LUMI_API_WATCH, NULL, NULL, lumi_api_serve_field},
-    {"/api/v1/field/view.jpg", "GET", LUMI_API_WATCH, lumi_api_view_fields, lumi_api_see_field, lumi_api_serve_view},
+    {"/api/v1/field/view.jpg", "GET", LUMI_API_WATCH, lumi_api_view_fields, NULL, lumi_api_serve_view},
     {"/metrics", "GET", LUMI_API_WATCH, NULL, get_metrics, NULL},
     {"/", "GET", LUMI_API_ANYBODY, NULL, NULL, lumi_api_serve_page},
     {"/page/{name}", "GET", LUMI_API_ANYBODY, NULL, NULL, lumi_api_serve_page},

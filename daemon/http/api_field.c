@@ -1,7 +1,6 @@
 /* The light field so far: how far it has come, and views of it. */
 #include "daemon/http/api_priv.h"
 
-#include <pthread.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
@@ -10,25 +9,9 @@
 struct lumi_api_field_views {
     struct lumi_http *http;
     struct lumi_field *field; /* the server's thread's */
-    pthread_mutex_t lock;
-    char capture[sizeof((struct lumi_engine_status *)0)->capture]; /* under the lock: the engine's thread knows it */
 };
 
-/* ---- the engine's thread ---- */
-
-void lumi_api_see_field(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
-{
-    struct lumi_api_field_views *views = http->field;
-
-    (void)answer;
-    (void)body;
-    lumi_engine_status(http->options.engine, http->status);
-    pthread_mutex_lock(&views->lock);
-    g_strlcpy(views->capture, http->status->capture, sizeof views->capture);
-    pthread_mutex_unlock(&views->lock);
-}
-
-/* ---- the server's ---- */
+/* ---- how far it is ---- */
 
 static void put_status(JsonBuilder *builder, const struct lumi_field_status *status)
 {
@@ -67,25 +50,35 @@ void lumi_api_serve_field(struct lumi_http *http, SoupServerMessage *message, co
     lumi_api_send(message, &answer);
 }
 
+/* ---- views ---- */
+
 /* One who waits for a view. */
 struct waiting {
+    struct lumi_api_letter letter; /* asks the engine which capture it is */
     struct lumi_http *http;
     SoupServerMessage *message;
+    struct lumi_field_gaze gaze;
+    char *who;
+    char capture[sizeof((struct lumi_engine_status *)0)->capture];
+    bool away, gone; /* the letter is; who asked has hung up meanwhile */
 };
 
 static void end_waiting(struct waiting *waiting)
 {
     g_signal_handlers_disconnect_by_data(waiting->message, waiting);
     g_object_unref(waiting->message);
+    g_free(waiting->who);
     g_free(waiting);
 }
 
-/* Who asked has hung up. */
 static void on_finished(SoupServerMessage *message, void *context)
 {
     struct waiting *waiting = context;
 
     (void)message;
+    waiting->gone = true;
+    if (waiting->away)
+        return;
     lumi_field_forget(waiting->http->field->field, waiting);
     end_waiting(waiting);
 }
@@ -140,6 +133,35 @@ static double real_of(const struct lumi_api_value *value, double otherwise)
     return value->given ? value->real : otherwise;
 }
 
+/* In the server's thread again. */
+static void come_back(struct lumi_api_letter *letter, bool dropped)
+{
+    struct waiting *waiting = (struct waiting *)letter;
+
+    waiting->away = false;
+    if (dropped || waiting->gone)
+        end_waiting(waiting);
+    else
+        lumi_field_ask(waiting->http->field->field, waiting->capture, waiting->who, &waiting->gaze, on_answered,
+                       waiting);
+}
+
+/* In the engine's. */
+static void go_there(struct lumi_api_letter *letter, bool dropped)
+{
+    struct waiting *waiting = (struct waiting *)letter;
+    struct lumi_http *http = waiting->http;
+
+    if (dropped) {
+        end_waiting(waiting);
+        return;
+    }
+    lumi_engine_status(http->options.engine, http->status);
+    g_strlcpy(waiting->capture, http->status->capture, sizeof waiting->capture);
+    letter->read = come_back;
+    lumi_api_post_give(http->to_server, letter);
+}
+
 void lumi_api_serve_view(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
 {
     const struct lumi_api_value *values = body->values;
@@ -151,23 +173,21 @@ void lumi_api_serve_view(struct lumi_http *http, SoupServerMessage *message, con
                                          .fov = real_of(&values[5], 70 * PI / 180),
                                          .width = values[6].given ? values[6].number : 640,
                                          .height = values[7].given ? values[7].number : 400};
-    struct lumi_api_field_views *views = http->field;
-    g_autofree char *who = name_of(message, values[8].string);
-    char capture[sizeof views->capture];
 
     if (gaze.width < SIZE_LEAST || gaze.height < SIZE_LEAST) {
         lumi_api_send_problem(message, 400, "argument", "width, height: 16 pixels are the least");
         return;
     }
     struct waiting *waiting = g_new0(struct waiting, 1);
-    pthread_mutex_lock(&views->lock);
-    g_strlcpy(capture, views->capture, sizeof capture);
-    pthread_mutex_unlock(&views->lock);
+    waiting->letter.read = go_there;
     waiting->http = http;
+    waiting->gaze = gaze;
+    waiting->who = name_of(message, values[8].string);
     waiting->message = g_object_ref(message);
+    waiting->away = true;
     g_signal_connect(message, "finished", G_CALLBACK(on_finished), waiting);
     soup_server_message_pause(message);
-    lumi_field_ask(views->field, capture, who, &gaze, on_answered, waiting);
+    lumi_api_post_give(http->to_engine, &waiting->letter);
 }
 
 const struct lumi_api_field lumi_api_view_fields[] = {
@@ -198,7 +218,6 @@ int lumi_api_field_create(struct lumi_http *http, struct lumi_api_field_views **
         .command = http->options.preview, .context = http->context, .news = tell_news, .log = log_line, .user = made};
 
     made->http = http;
-    pthread_mutex_init(&made->lock, NULL);
     *views = made;
     return lumi_field_create(&options, &made->field, error);
 }
@@ -208,6 +227,5 @@ void lumi_api_field_destroy(struct lumi_api_field_views *views)
     if (!views)
         return;
     lumi_field_destroy(views->field);
-    pthread_mutex_destroy(&views->lock);
     g_free(views);
 }

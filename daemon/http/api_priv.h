@@ -34,7 +34,7 @@ struct lumi_http {
     struct lumi_api_live *live;
     struct lumi_api_pictures *pictures;
     struct lumi_api_shelf *shelf;
-    struct lumi_api_field_views *field; /* its lock is for both threads */
+    struct lumi_api_field_views *field;
     /* In both: each has members of its own. */
     struct lumi_api_events *events;
     /* In the engine's. */
@@ -190,7 +190,6 @@ GBytes *lumi_api_picture_bytes(struct lumi_picture *picture);
 int lumi_api_field_create(struct lumi_http *http, struct lumi_api_field_views **views, struct lumi_error *error);
 void lumi_api_field_destroy(struct lumi_api_field_views *views); /* the server's thread is no more */
 extern const struct lumi_api_field lumi_api_view_fields[];
-void lumi_api_see_field(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body);
 void lumi_api_serve_field(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 void lumi_api_serve_view(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body);
 

@@ -20,6 +20,7 @@
 #define DB_HEADER 100
 #define COPY_MAX ((size_t)1 << 30)
 #define ATTEMPTS 8
+#define FREE_PAGES 256
 
 struct part {
     uint8_t *data;
@@ -62,14 +63,19 @@ static bool measure(const struct part *wal, size_t *count, size_t *pages)
     const bool big_endian = big(wal->data) & 1;
     const size_t page = big(wal->data + 8), step = WAL_FRAME + page;
     sum(wal->data, 24, big_endian, sums);
+#ifndef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
     if (sums[0] != big(wal->data + 24) || sums[1] != big(wal->data + 28))
         return false;
+#endif
     for (size_t i = 0; (i + 1) * step <= wal->size - WAL_HEADER; i++) {
         const uint8_t *frame = wal->data + WAL_HEADER + i * step;
         sum(frame, 8, big_endian, sums);
         sum(frame + WAL_FRAME, page, big_endian, sums);
-        if (memcmp(frame + 8, wal->data + 16, 8) || sums[0] != big(frame + 16) || sums[1] != big(frame + 20) ||
-            big(frame) == 0)
+#ifndef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
+        if (sums[0] != big(frame + 16) || sums[1] != big(frame + 20))
+            break;
+#endif
+        if (memcmp(frame + 8, wal->data + 16, 8) || big(frame) == 0)
             break;
         if (big(frame + 4)) {
             *count = i + 1;
@@ -87,7 +93,8 @@ int capture_apply_log(uint8_t **data, size_t *size, const uint8_t *log, size_t l
     if (!measure(&wal, &count, &pages))
         return LUMI_OK;
     const size_t page = big(log + 8), whole = pages * page;
-    if (whole > COPY_MAX)
+    /* A log adds the pages it has, and some that are free; one that claims much more is none of ours. */
+    if (whole > COPY_MAX || pages > 2 * (*size / page + count) + FREE_PAGES)
         return LUMI_ERR_LIMIT;
     if (whole != *size) {
         uint8_t *more = lumi_realloc(*data, whole, 1);
