@@ -52,6 +52,9 @@ expect 0 "clears" "$lumi" capture clear
 expect 0 "looks for the index mark" "$lumi" capture home --turn 3
 expect 0 "looks for the index mark" "$lumi" capture home --wind-up
 expect_line 2 "--turn: 0 or more" "$lumi" capture home --turn -1
+expect 0 "the rig turns" "$lumi" capture jog -- -22.5
+expect_line 2 "DEGREES: up to 360" "$lumi" capture jog 400
+expect_line 3 "there are no captures here" "$lumi" capture verify nothing.capture
 expect_line 2 "--emergency goes with neither" "$lumi" capture stop --emergency --now
 expect_line 3 "none: cannot open" "$lumi" capture start "$scratch/none"
 

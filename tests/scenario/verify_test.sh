@@ -13,6 +13,9 @@ if python3 -c "import bagit" 2>/dev/null; then
 fi
 expect 0 "a: whole, sealed: 16 files" "$lumi" verify "$scratch/a"
 expect 0 '"whole":true' "$lumi" verify --json "$scratch/a"
+seal=$(sha256sum <"$scratch/a/tagmanifest-sha256.txt" | cut -d ' ' -f 1)
+expect 0 "seal: $seal" "$lumi" verify "$scratch/a"
+expect 0 "\"seal\":\"$seal\"" "$lumi" verify --json "$scratch/a"
 cp -r "$scratch/a" "$scratch/b"
 "$here/bagit_check.sh" "$scratch/b" || fail "a copy is no BagIt bag"
 

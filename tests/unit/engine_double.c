@@ -73,6 +73,8 @@ int lumi_engine_start(struct lumi_engine *engine, int64_t now_ns, const char *pl
     copy_list(start->override);
     engine_double.has_override = start->override != NULL;
     engine_double.preflight_only = start->preflight_only;
+    if (engine_double.one_start && engine_double.status.state == LUMI_ENGINE_PREFLIGHT)
+        return lumi_fail(error, LUMI_ERR_BUSY, "another capture is under way: hall, preflight");
     if (!engine_double.code)
         engine_double.status.state = LUMI_ENGINE_PREFLIGHT;
     return answer("start", error);

@@ -23,6 +23,7 @@ struct engine_double {
     char call[32], plan[LUMI_PLAN_TEXT_MAX + 1], name[256], title[256], capture[1024], first[256];
     int calls, count;
     double radians;
+    bool one_start; /* the second start finds the first one under way */
     bool preflight_only, at_once, seal, again, has_override;
 };
 extern struct engine_double engine_double;
