@@ -1,5 +1,5 @@
 /* bench_preview FOLDER MEGABYTES ROUNDS: what previews cost a capture. Frames of 16 cameras, 5.5 Mpixel raw8 each, come
- * from pools of buffers as cameras have (6 a camera) and go into the store; each is offered to the pictures by the
+ * from pools of buffers as cameras have (8 a camera) and go into the store; each is offered to the pictures by the
  * engine's rule. In turns: nobody watches, and four clients watch four cameras over HTTP.
  *
  *   full speed   as fast as the store takes them: MB/s stored, with and without
@@ -10,7 +10,9 @@
 #define _GNU_SOURCE
 #include "daemon/camera/camera_device.h"
 #include "daemon/http/api_server.h"
+#include "daemon/preview/pictures_priv.h"
 #include "daemon/store/store.h"
+#include "proto/base/memory.h"
 
 #include <arpa/inet.h>
 #include <math.h>
@@ -20,6 +22,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -29,7 +32,7 @@
 #define PIXELS ((size_t)WIDTH * HEIGHT)
 #define HEAD ((size_t)4096)
 #define CAMERAS 16
-#define BUFFERS 6 /* of a camera */
+#define BUFFERS 8 /* of a camera, as it has by default */
 #define WATCHED 4
 #define SWEEP_SHOTS 24
 #define SHOT_SECONDS 0.42
@@ -45,8 +48,8 @@ struct bench {
     struct lumi_store *store;
     size_t memory;
     struct buffer buffers[CAMERAS][BUFFERS];
-    int held[CAMERAS]; /* by the store */
-    int done, failed, lost;
+    int held[CAMERAS];         /* by the store */
+    int done, failed, lost[2]; /* lost: with nobody watching, with four */
     double slowest;
     struct lumi_pictures *pictures;
     struct lumi_http *http;
@@ -66,6 +69,16 @@ static double seconds(void)
 
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+/* Processor's, of all threads. */
+static double core_seconds(void)
+{
+    struct rusage usage;
+
+    getrusage(RUSAGE_SELF, &usage);
+    return (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+           (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec) * 1e-6;
 }
 
 static int64_t now_ns(void *context)
@@ -254,7 +267,7 @@ static void give_all(struct bench *bench, int frames, double pace)
         if (buffer)
             give(bench, i, buffer);
         given += buffer != NULL;
-        bench->lost += buffer == NULL; /* as a camera that has nowhere to put it */
+        bench->lost[atomic_load(&bench->watching)] += buffer == NULL; /* as a camera that has nowhere to put it */
         collect(bench);
     }
     while (bench->done < given) {
@@ -329,14 +342,16 @@ static void set_up(struct bench *bench)
 
 /* Both kinds of round, so many times: which is first changes. */
 static void measure(struct bench *bench, const char *folder, int frames, int rounds, double pace, double took[2],
-                    double slowest[2], int parts[2])
+                    double cores[2], double slowest[2], int parts[2])
 {
     for (int i = 0; i < 2 * rounds; i++) {
         const int watched = (i + 1) / 2 % 2; /* 0 1 1 0 */
         if (watched)
             begin_watching(bench);
         const int before = atomic_load(&bench->parts);
+        const double used = core_seconds();
         took[watched] += round_of(bench, folder, frames, pace);
+        cores[watched] += core_seconds() - used;
         parts[watched] += atomic_load(&bench->parts) - before;
         slowest[watched] = fmax(slowest[watched], bench->slowest);
         if (watched)
@@ -344,11 +359,34 @@ static void measure(struct bench *bench, const char *folder, int frames, int rou
     }
 }
 
+/* One frame's copy and picture, on a processor's own time. */
+static void measure_one(const struct bench *bench)
+{
+    double copying = INFINITY, making = INFINITY;
+
+    for (int i = 0; i < 20; i++) {
+        struct pictures_small small;
+        struct lumi_picture *picture;
+        struct lumi_error error = {0};
+        const double begun = core_seconds();
+        check(pictures_take(&bench->buffers[0][0].frame, 640, &small, &error), &error);
+        const double copied = core_seconds();
+        check(pictures_make(&small, 640, 75, &picture, &error), &error);
+        copying = fmin(copying, copied - begun);
+        making = fmin(making, core_seconds() - copied);
+        pictures_small_clear(&small);
+        lumi_free(picture->jpeg);
+        lumi_free(picture);
+    }
+    printf("a frame of %d x %d: %.1f ms to copy, %.1f ms to make a picture of\n", WIDTH, HEIGHT, copying * 1e3,
+           making * 1e3);
+}
+
 int main(int argc, char **argv)
 {
     struct bench *bench = calloc(1, sizeof *bench);
     struct lumi_pictures_figures figures;
-    double took[2] = {0}, paced[2] = {0}, slowest[2] = {0};
+    double took[2] = {0}, cores[2] = {0}, paced[2] = {0}, paced_cores[2] = {0}, slowest[2] = {0};
     int parts[2] = {0}, paced_parts[2] = {0};
 
     if (argc < 4 || !bench) {
@@ -359,20 +397,27 @@ int main(int argc, char **argv)
     const int frames = (int)(atof(argv[2]) * 1e6 / (double)(PIXELS + HEAD)) / CAMERAS * CAMERAS + CAMERAS;
     const double megabytes = (double)frames * (double)(PIXELS + HEAD) * 1e-6 * rounds;
     set_up(bench);
+    measure_one(bench);
     round_of(bench, argv[1], frames, 0); /* what is slow only once */
-    measure(bench, argv[1], frames, rounds, 0, took, (double[2]){0}, parts);
+    measure(bench, argv[1], frames, rounds, 0, took, cores, (double[2]){0}, parts);
     const double share = took[0] / took[1];
     lumi_pictures_figures(bench->pictures, &figures);
     printf("full speed: %.0f MB/s with nobody watching, %.0f MB/s with four previews open: %.1f %%; %d pictures came "
            "(%.2f a second each), of %llu frames with their turn %llu were shed\n",
            megabytes / took[0], megabytes / took[1], 100 * share, parts[1], parts[1] / took[1] / WATCHED,
            (unsigned long long)(figures.taken + figures.shed), (unsigned long long)figures.shed);
-    measure(bench, argv[1], CAMERAS * SWEEP_SHOTS, (rounds + 3) / 4, SHOT_SECONDS, paced, slowest, paced_parts);
+    measure(bench, argv[1], CAMERAS * SWEEP_SHOTS, (rounds + 7) / 8, SHOT_SECONDS, paced, paced_cores, slowest,
+            paced_parts);
+    printf("core-seconds a gigabyte: %.3f with nobody watching, %.3f with four previews open\n",
+           cores[0] / megabytes * 1e3, cores[1] / megabytes * 1e3);
     printf("a sweep at 211 MB/s: %d pictures came (%.2f a second each); a frame was on the disk after %.2f s at most, "
            "with nobody watching after %.2f s\n",
            paced_parts[1], paced_parts[1] / paced[1] / WATCHED, slowest[1], slowest[0]);
-    printf("frames lost: %d; failed: %d\n", bench->lost, bench->failed);
+    printf("core-seconds a second: %.3f with nobody watching, %.3f with four previews open\n",
+           paced_cores[0] / paced[0], paced_cores[1] / paced[1]);
+    printf("frames lost: %d with nobody watching, %d with four previews open; failed: %d\n", bench->lost[0],
+           bench->lost[1], bench->failed);
     lumi_http_stop(bench->http);
     lumi_pictures_destroy(bench->pictures);
-    return bench->lost > 0 || bench->failed > 0 || share < 0.98 || paced_parts[1] == 0;
+    return bench->lost[0] + bench->lost[1] > 0 || bench->failed > 0 || share < 0.98 || paced_parts[1] == 0;
 }

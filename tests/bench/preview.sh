@@ -7,4 +7,4 @@ set -eu
 program=$1/tests/bench/bench_preview
 work_folder "${2:-}"
 machine
-"$program" "$dir" "${LUMI_PREVIEW_MB:-2000}" "${LUMI_PREVIEW_ROUNDS:-8}"
+"$program" "$dir" "${LUMI_PREVIEW_MB:-700}" "${LUMI_PREVIEW_ROUNDS:-24}"
