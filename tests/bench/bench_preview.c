@@ -1,5 +1,5 @@
 /* bench_preview FOLDER MEGABYTES ROUNDS: what previews cost a capture. Frames of 16 cameras, 5.5 Mpixel raw8 each, come
- * from pools of buffers as cameras have (8 a camera) and go into the store; each is offered to the pictures by the
+ * from pools of buffers as cameras have (6 a camera) and go into the store; each is offered to the pictures by the
  * engine's rule. In turns: nobody watches, and four clients watch four cameras over HTTP.
  *
  *   full speed   as fast as the store takes them: MB/s stored, with and without
@@ -32,7 +32,7 @@
 #define PIXELS ((size_t)WIDTH * HEIGHT)
 #define HEAD ((size_t)4096)
 #define CAMERAS 16
-#define BUFFERS 8 /* of a camera, as it has by default */
+#define BUFFERS 6 /* of a camera: together just what the store takes */
 #define WATCHED 4
 #define SWEEP_SHOTS 24
 #define SHOT_SECONDS 0.42
