@@ -56,7 +56,7 @@ struct lumi_pictures {
 
 void lumi_pictures_options_init(struct lumi_pictures_options *options)
 {
-    *options = (struct lumi_pictures_options){.per_second = 1, .watched_per_second = 4, .width = 640, .quality = 75};
+    *options = (struct lumi_pictures_options){.per_second = 1, .watched_per_second = 2, .width = 640, .quality = 75};
 }
 
 static bool is_camera(const struct lumi_pictures *pictures, int camera)

@@ -31,7 +31,7 @@ struct lumi_pictures_options {
     int cameras;
     char names[LUMI_PICTURES_CAMERAS][LUMI_PICTURE_NAME]; /* of the cameras */
     double per_second;                                    /* of a camera that nobody watches (1) */
-    double watched_per_second;                            /* of one that somebody does (4) */
+    double watched_per_second;                            /* of one that somebody does (2) */
     int width;                                            /* of a picture, at most (640) */
     int quality;                                          /* of its JPEG (75) */
     bool synchronous;
