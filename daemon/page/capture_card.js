@@ -92,6 +92,9 @@ export class CaptureCard {
         const now = verifying.get(capture.name);
 
         this.running = now?.state === "running";
+        if (now && !this.running && this.told !== now)
+            this.notice.clear(); // what was begun has ended: the line above says how
+        this.told = now;
         if (this.running)
             this.checked.set(t("verify.running", { done: bytes(now.done), all: bytes(now.total) }), now.total ? now.done / now.total : NaN);
         else if (now && !capture.verified)
