@@ -19,8 +19,7 @@ if(TARGET lumid)
   target_link_libraries(watch_pictures PRIVATE lumi_flags lumi_image lumi_base PkgConfig::libsoup_3_0)
   add_test(NAME rig_pictures_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/rig_pictures_test.sh $<TARGET_FILE:lumi>
     $<TARGET_FILE:lumid> $<TARGET_FILE:watch_pictures>)
-  set_tests_properties(rig_pictures_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
-  lumi_sanitized(rig_pictures_test)
+  set_tests_properties(rig_pictures_test PROPERTIES SKIP_RETURN_CODE 77 LABELS slow TIMEOUT 600)
   # Many who only listen.
   add_executable(hold_streams hold_streams.c)
   target_link_libraries(hold_streams PRIVATE lumi_flags PkgConfig::libsoup_3_0 PkgConfig::json_glib_1_0)

@@ -67,7 +67,7 @@ need_network
 rm -rf rig_pictures_test.tmp
 mkdir rig_pictures_test.tmp
 cd rig_pictures_test.tmp
-"$lumi" sim rig room --rig arc:3x4:0.18 --size 96x77 -o rig --seed 4 --bits 12 --patience 60 --position-time 2 \
+"$lumi" sim rig room --rig arc:3x4:0.18 --size 96x77 -o rig --seed 4 --bits 12 --patience 60 \
     --port 8484 --own-network -- \
     sh "$here/rig_pictures_test.sh" "$lumi" "$lumid" "$pictures" operate || fail "the rig ended badly"
 capture=$(echo rig/captures/*.capture)
