@@ -1,4 +1,6 @@
 /* The process with the board: virtual time, mechanics, and what the cameras are told of them. */
+#include "proto/base/file.h"
+#include "proto/base/memory.h"
 #include "sim/gige/rig_parts.h"
 #include "sim/rig/serve.h"
 
@@ -31,6 +33,7 @@ struct board_process {
     struct fired fired[LUMI_RIG_CAMERAS][FIRED];
     int steps_told; /* up to here they are in steps.txt */
     FILE *steps;
+    char faults[600];
     volatile sig_atomic_t stop;
 };
 
@@ -168,6 +171,24 @@ static void tell_steps(struct board_process *b, struct sim_machine *machine)
     b->steps_told = count;
 }
 
+/* A script that somebody has put into the folder since is taken, and its file removed. */
+static void take_faults(struct board_process *b, struct sim_machine *machine)
+{
+    static struct sim_fault_script script;
+    struct lumi_error error;
+    uint8_t *text;
+    size_t size;
+
+    if (access(b->faults, R_OK) != 0 || lumi_file_read(b->faults, 1 << 20, &text, &size, &error) != LUMI_OK)
+        return;
+    if (sim_fault_script_parse((const char *)text, size, b->faults, &script, &error) == LUMI_OK)
+        sim_machine_set_faults(machine, &script);
+    else
+        fprintf(stderr, "lumi sim rig: %s\n", error.text);
+    lumi_free(text);
+    unlink(b->faults);
+}
+
 static void hear_drive(struct board_process *b, struct sim_machine *machine)
 {
     struct rig_message message;
@@ -212,6 +233,7 @@ static void turn(void *context, struct sim_machine *machine)
         while (recv(b->setup->eyes[i], &message, sizeof message, MSG_DONTWAIT) == (ssize_t)sizeof message)
             hear(b, machine, &message);
     hear_drive(b, machine);
+    take_faults(b, machine);
     tell_drive(b, machine);
     tell_steps(b, machine);
     tell_clock(b, machine);
@@ -250,6 +272,8 @@ int rig_board_run(const struct rig_board *setup, struct lumi_error *error)
     options.turn = turn;
     options.turn_fd = setup->eye_count > 0 ? setup->eyes[0] : -1;
     options.context = &board;
+    snprintf(board.faults, sizeof board.faults, "%s/faults.now", setup->rig->folder);
+    unlink(board.faults);
     snprintf(steps, sizeof steps, "%s/steps.txt", setup->rig->folder);
     board.steps = fopen(steps, "w");
     if (!board.steps)

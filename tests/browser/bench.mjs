@@ -4,7 +4,7 @@
 //    means to bring about it allows by name (page.allow).
 // 2. Pictures and figures are kept in the folder of the test.
 import { spawn, spawnSync } from "node:child_process";
-import { appendFileSync, readFileSync, writeFileSync } from "node:fs";
+import { appendFileSync, existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { connect, createServer } from "node:net";
 import { join } from "node:path";
@@ -85,20 +85,29 @@ export class Bench {
 
     // ---- lumid ----
 
-    async start(lines) {
+    // `settings`: {group: {key: value}} beside what the rig's own configuration has.
+    async start(settings) {
         const file = join(this.folder, "lumid.conf");
+        let text = readFileSync(file, "utf8");
+
         // The pictures are small: what is smeared is judged where a test is about it.
-        const judge = lines.includes("[judge]") ? "" : "\n[judge]\nblur_pixels = 12\n";
-        writeFileSync(file, `${readFileSync(file, "utf8")}${judge}\n${lines}\n`);
+        for (const [group, keys] of Object.entries({ judge: { blur_pixels: 12 }, ...settings })) {
+            const lines = Object.entries(keys).map(([key, value]) => `${key} = ${value}\n`).join("");
+            text = text.includes(`[${group}]\n`) ? text.replace(`[${group}]\n`, `[${group}]\n${lines}`)
+                : `${text}\n[${group}]\n${lines}`;
+        }
+        writeFileSync(file, text);
         await this.startDaemon();
     }
 
     async startDaemon() {
-        const file = join(this.folder, "lumid.conf");
-        this.daemon = spawn(this.lumid, ["--config", file], { stdio: ["ignore", "ignore", "pipe"] });
+        this.daemon = spawn(this.lumid, ["--config", join(this.folder, "lumid.conf")], { stdio: ["ignore", "ignore", "pipe"] });
         this.daemon.stderr.on("data", (bytes) => appendFileSync(join(this.out, "lumid.log"), bytes));
-        await until("lumid is ready", () => this.log().includes("ready, port"));
-        await until("the board is there", () => this.log().includes("the board is there"));
+        const before = this.log().length;
+        await until("lumid is ready and has its board", () => {
+            check(this.daemon.exitCode === null, `lumid has ended: ${this.log()}`);
+            return /ready, port[^]*the board is there/.test(this.log().slice(before));
+        });
     }
 
     async stopDaemon(signal = "SIGTERM") {
@@ -150,6 +159,15 @@ export class Bench {
         return times.find((time) => time >= since);
     }
 
+    // What goes wrong from now on (docs/rig-simulation.md).
+    async fault(...lines) {
+        const file = join(this.folder, "faults.now");
+
+        writeFileSync(`${file}.new`, `${lines.map((line) => `at 0s ${line}`).join("\n")}\n`);
+        renameSync(`${file}.new`, file);
+        await until("the rig has taken the fault", () => !existsSync(file));
+    }
+
     // ---- browsers ----
 
     async browser(flags) {
@@ -182,6 +200,8 @@ export class Bench {
     guard(page, allowed) {
         const wrong = [];
 
+        if (process.env.LUMI_BROWSER_ALLOW)
+            allowed.push(new RegExp(process.env.LUMI_BROWSER_ALLOW));
         page.wrong = wrong;
         page.allow = (pattern) => allowed.push(pattern);
         page.at = (test, more = "") => page.locator(`[data-test="${test}"]${more}`);

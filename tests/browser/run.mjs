@@ -1,22 +1,20 @@
 // Runs one spec: outside, it starts the simulated rig that the spec wants, with itself in the rig's network; inside, lumid
 // and the cases one after the other. The first that fails ends it, with a picture of every page that is open.
 import { spawn } from "node:child_process";
-import { closeSync, openSync, readFileSync, writeFileSync } from "node:fs";
+import { closeSync, openSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { Bench } from "./bench.mjs";
 
 const [lumi, lumid, packages, out, specFile] = process.argv.slice(2);
 const spec = await import(pathToFileURL(specFile).href);
-const rig = { place: "room", arc: "3x8:0.2", size: "96x77", seconds: 1, faults: "", options: [], ...spec.rig };
+const rig = { place: "object", arc: "4x8:0.2", size: "48x48", seconds: 1, options: [], ...spec.rig };
 
 function outside() {
-    const faults = join(out, "faults.txt");
     const log = openSync(join(out, "rig.log"), "w");
 
-    writeFileSync(faults, rig.faults);
     const options = ["--rig", `arc:${rig.arc}`, "--size", rig.size, "--white", "0.008", "--continuous",
-        "--position-time", String(rig.seconds), "--patience", String(rig.patience ?? 6), "--faults", faults,
+        "--position-time", String(rig.seconds), "--patience", String(rig.patience ?? 30),
         "-o", join(out, "rig"), ...rig.options, "--own-network"];
     const child = spawn(lumi, ["sim", "rig", rig.place, ...options, "--", process.execPath, ...process.argv.slice(1)],
         { stdio: ["ignore", "inherit", log] });
@@ -35,7 +33,7 @@ async function inside() {
     let failed = false;
 
     try {
-        await bench.start(rig.conf ?? "");
+        await bench.start(rig.settings ?? {});
         for (const [name, work] of spec.cases) {
             const began = Date.now();
             try {

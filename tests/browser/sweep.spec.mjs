@@ -1,0 +1,113 @@
+// A capture as a crew takes it: a plan that cannot be run, one that can; the preflight, green; a sweep that two browsers
+// watch to its end, one of them on a phone, the other loaded anew in the middle; a pause. Then the capture is verified,
+// downloaded and deleted.
+import { createHash } from "node:crypto";
+import { readFileSync, statSync } from "node:fs";
+import { join } from "node:path";
+import { spawnSync } from "node:child_process";
+import { check, until } from "./bench.mjs";
+import { connected, goTo, preflight, press, seesState, sphere, usePlan } from "./operator.mjs";
+
+export const rig = { arc: "4x10:0.2", seconds: 2, settings: { process: { command: "cp -r %c %c.work" } } };
+const FRAMES = 40;
+
+async function badPlan(bench) {
+    const page = await bench.open();
+
+    await goTo(page, "plans");
+    await page.at("plan-text").fill(bench.plan().replace(/^turns = .*$/m, "turns = many"));
+    const problem = page.at("plan-problem").first();
+    await problem.waitFor();
+    const line = bench.plan().split("\n").findIndex((one) => one.startsWith("turns")) + 1;
+    check((await problem.innerText()).includes(String(line)), `line ${line} is not named: ${await problem.innerText()}`);
+    await bench.picture(page, "plan-that-cannot-be-run");
+    await goTo(page, "rig");
+    check(await page.at("start").isDisabled(), "start can be pressed with a plan that cannot be run");
+
+    await usePlan(page, bench.plan());
+    check(await page.at("start").isDisabled(), "start can be pressed before the preflight");
+    check((await page.at("start-why").innerText()).length > 10, "why start cannot be pressed is not said");
+}
+
+async function reload(page) {
+    const before = (await sphere(page)).good;
+
+    await page.reload();
+    await connected(page);
+    await goTo(page, "sweep");
+    await until("the sphere is back", async () => (await sphere(page)).good >= before);
+}
+
+async function sweep(bench) {
+    const page = await bench.open();
+    const phone = await bench.open({ size: "phone", theme: "light" });
+
+    await goTo(phone, "sweep");
+    await usePlan(page, bench.plan());
+    const verdicts = await preflight(page);
+    check(Object.values(verdicts).every((one) => one === "green"), `not green: ${JSON.stringify(verdicts)}`);
+    await bench.picture(page, "preflight-green");
+    await press(page, "start");
+    await goTo(page, "sweep");
+    await seesState(page, "sweeping");
+    await until("frames come", async () => (await sphere(page)).good >= 2);
+    await page.at("pause").click();
+    for (const one of [page, phone])
+        await seesState(one, "paused");
+    check((await sphere(page)).mode === "webgl", "the sphere is not drawn by WebGL");
+    check((await sphere(page)).good < FRAMES, "it was paused too late to show anything");
+    await bench.picture(page, "paused");
+    await reload(page);
+    await seesState(page, "paused");
+
+    const people = await press(page, "resume");
+    check(people.length > 0, "who else is connected is not said");
+    await seesState(phone, "sweeping");
+    await bench.picture(phone, "sweep-phone-bright");
+    await reload(page);
+    await seesState(page, "done", 90);
+    for (const one of [page, phone]) {
+        await seesState(one, "done");
+        await until("every frame is good on the sphere", async () => {
+            const found = await sphere(one);
+            return found.good === FRAMES && found.bad === 0 && found.planned === 0;
+        });
+    }
+    await bench.picture(page, "sweep-done");
+}
+
+async function captures(bench) {
+    const page = await bench.open();
+
+    await goTo(page, "captures");
+    const capture = page.at("capture").first();
+    await capture.waitFor();
+    const name = await capture.getAttribute("data-name");
+    await bench.picture(page, "captures");
+    await capture.locator('[data-test="capture-verify"]').click();
+    await until("the capture is verified", async () => {
+        const { json } = await bench.ask("/api/v1/captures");
+        return json.captures[0].verified?.good;
+    });
+
+    const waits = page.waitForEvent("download");
+    await capture.locator('[data-test="capture-download"]').click();
+    const download = await waits;
+    const file = join(bench.out, "bundle.tar");
+    await download.saveAs(file);
+    const list = spawnSync("tar", ["-tf", file], { encoding: "utf8" });
+    check(list.status === 0 && list.stdout.includes("manifest-sha256.txt"), `the bundle is no capture: ${list.stderr}`);
+    bench.figure("bundle", `${statSync(file).size} bytes, sha256 ${createHash("sha256").update(readFileSync(file)).digest("hex").slice(0, 12)}`);
+
+    await capture.locator('[data-test="capture-delete"]').click();
+    await bench.picture(page, "delete-asks");
+    await page.at("dialog-cancel").click();
+    check((await bench.ask("/api/v1/captures")).json.captures.length === 1, "it was deleted though nobody said so");
+    check(name, "the capture has no name");
+}
+
+export const cases = [
+    ["a plan that cannot be run is said at its line, and start cannot be pressed", badPlan],
+    ["a sweep is watched to its end by two browsers, paused, and one is loaded anew", sweep],
+    ["a capture is verified, downloaded, and not deleted without a word", captures],
+];
