@@ -9,7 +9,6 @@
 GResource *lumi_page_get_resource(void); /* made by the build from daemon/page */
 
 #define FOLDER "/lumisphere/page/"
-#define FILES_MAX 64
 
 struct page_file {
     GBytes *plain, *packed;
@@ -34,8 +33,8 @@ static const struct {
     {".webmanifest", "application/manifest+json"},
 };
 
-static char *names[FILES_MAX + 1];
-static struct page_file files[FILES_MAX];
+static char **names; /* NULL-terminated, for as long as the program lives, as the files are */
+static struct page_file *files;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
 static GBytes *pack(GBytes *plain)
@@ -60,7 +59,11 @@ static void load(void)
     GResource *resource = lumi_page_get_resource();
     g_auto(GStrv) found = g_resource_enumerate_children(resource, FOLDER, 0, NULL);
 
-    for (int i = 0, put = 0; found && found[i] && put < FILES_MAX; i++) {
+    const guint count = found ? g_strv_length(found) : 0;
+
+    names = g_new0(char *, count + 1);
+    files = g_new0(struct page_file, count + 1);
+    for (guint i = 0, put = 0; i < count; i++) {
         g_autofree char *path = g_strconcat(FOLDER, found[i], NULL);
         g_autoptr(GBytes) bytes = g_resource_lookup_data(resource, path, 0, NULL);
         if (!bytes)
