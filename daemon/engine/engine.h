@@ -214,7 +214,8 @@ int lumi_engine_home(struct lumi_engine *engine, int64_t now_ns, int turn, bool 
 /* Turns the platform by so many radians, where nothing sweeps and the position is known. */
 int lumi_engine_jog(struct lumi_engine *engine, int64_t now_ns, double radians, struct lumi_error *error);
 /* Opens a capture that a crash left in config.folder, if there is one; *found. It goes on by itself when board and
- * cameras are there, unless it was paused. */
+ * cameras are there, unless it was paused. One that cannot be gone on with (another rig's, damaged) is an error that
+ * names it; it stays as it is, and the engine rests. */
 int lumi_engine_recover(struct lumi_engine *engine, int64_t now_ns, bool *found, struct lumi_error *error);
 
 /* One picture of this camera, now, while nothing is under way: for who stands before it. Asked for again and again, the

@@ -357,6 +357,8 @@ static bool was_paused(const char *path)
 int lumi_engine_recover(struct lumi_engine *e, int64_t now_ns, bool *found, struct lumi_error *error)
 {
     char path[1400];
+    struct lumi_error failed;
+    int code;
 
     e->now = now_ns > e->now ? now_ns : e->now;
     *found = false;
@@ -365,7 +367,14 @@ int lumi_engine_recover(struct lumi_engine *e, int64_t now_ns, bool *found, stru
     if (!find(e, unfinished, path, sizeof path))
         return LUMI_OK;
     const bool paused = was_paused(path);
-    LUMI_TRY(engine_reopen(e, path, error));
+    code = engine_reopen(e, path, &failed);
+    if (code != LUMI_OK) {
+        engine_account_free(e);
+        e->capture[0] = '\0';
+        engine_incident(e, -1, "left", "%s was interrupted, cannot be gone on with, and stays as it is: %s", path,
+                        failed.text);
+        return lumi_fail(error, code, "%s: %s", path, failed.text);
+    }
     *found = true;
     engine_incident(e, -1, "recovered", "the program had died; %d of %d frames are stored",
                     e->at_count[AT_STORED] + e->at_count[AT_ACCEPTED] + e->at_count[AT_REJECTED],

@@ -268,14 +268,16 @@ static int start_engine(struct lumi_service *service, struct lumi_error *error)
 }
 
 /* With a large capture this takes seconds. */
-static int recover(struct lumi_service *service, struct lumi_error *error)
+/* What cannot be gone on with keeps nobody from taking the next capture, nor from looking at what is there. */
+static void recover(struct lumi_service *service)
 {
+    struct lumi_error error;
     bool found = false;
 
-    LUMI_TRY(lumi_engine_recover(service->engine, lumi_service_now(), &found, error));
-    if (found)
+    if (lumi_engine_recover(service->engine, lumi_service_now(), &found, &error) != LUMI_OK)
+        lumi_service_log(3, "a capture that was interrupted stays as it is: %s", error.text);
+    else if (found)
         lumi_service_log(5, "a capture that was interrupted goes on");
-    return LUMI_OK;
 }
 
 static int read_token(struct lumi_service *service, struct lumi_error *error)
@@ -385,7 +387,7 @@ static int start_rig(struct lumi_service *service, struct lumi_error *error)
     LUMI_TRY(start_cameras(service, error));
     LUMI_TRY(start_engine(service, error));
     LUMI_TRY(start_http(service, error)); /* an emergency stop is heard from here on */
-    LUMI_TRY(recover(service, error));
+    recover(service);
     start_loop(service);
     return LUMI_OK;
 }

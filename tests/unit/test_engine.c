@@ -445,6 +445,37 @@ static void a_killed_program_goes_on_where_it_was(void **state)
     end_whole(&b);
 }
 
+static void a_capture_of_another_rig_is_left_as_it_is(void **state)
+{
+    struct lumi_error error = {0};
+    char name[LUMI_RIG_NAME];
+    struct bench b;
+    bool found;
+
+    (void)state;
+    bench_begin(&b, LUMI_PLAN_CONTINUOUS, 1);
+    start(&b);
+    while (bench_status(&b)->stored + b.status.accepted < 3)
+        bench_run(&b, 0.01);
+    bench_kill(&b);
+    b.state = lumi_wire_State_IDLE;
+    memcpy(name, b.config.cameras[1].name, sizeof name);
+    snprintf(b.config.cameras[1].name, sizeof name, "other");
+    bench_engine(&b);
+    assert_int_equal(lumi_engine_recover(b.engine, b.now, &found, &error), LUMI_ERR_NOTFOUND);
+    assert_false(found);
+    assert_non_null(strstr(error.text, "test.capture: camera"));
+    assert_int_equal(bench_status(&b)->state, LUMI_ENGINE_IDLE);
+    assert_string_equal(b.status.capture, "");
+    bench_kill(&b);
+    memcpy(b.config.cameras[1].name, name, sizeof name); /* the rig that it is of */
+    bench_engine(&b);
+    assert_int_equal(lumi_engine_recover(b.engine, b.now, &found, &error), LUMI_OK);
+    assert_true(found);
+    assert_complete(&b, 300);
+    end_whole(&b);
+}
+
 static void a_board_that_restarts_is_homed_and_told_what_is_done(void **state)
 {
     struct bench b;
@@ -556,6 +587,7 @@ int main(void)
         cmocka_unit_test(a_bracket_that_nobody_can_verify_is_told_before_it_is_taken),
         cmocka_unit_test(exposures_of_a_bracket_are_told_to_the_cameras),
         cmocka_unit_test(a_killed_program_goes_on_where_it_was),
+        cmocka_unit_test(a_capture_of_another_rig_is_left_as_it_is),
         cmocka_unit_test(a_board_that_restarts_is_homed_and_told_what_is_done),
         cmocka_unit_test(nothing_goes_on_while_a_fault_stands),
         cmocka_unit_test(a_full_disk_loses_nothing),
