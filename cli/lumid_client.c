@@ -217,8 +217,8 @@ static int nobody(const struct cli_lumid *lumid, struct lumi_error *error)
     if (lumid->local)
         return lumi_fail(error, LUMI_ERR_ARG, "%s cannot be read: be root, or in the group of that file", lumid->local);
     return lumi_fail(error, LUMI_ERR_ARG,
-                     "lumid at %s answers to its users only: --token-file names a file with its token (on its own "
-                     "computer local.token in the folder [http] access)",
+                     "lumid at %s: a token is needed: --token-file names the file that it is in (on its own computer "
+                     "local.token in the folder [http] access)",
                      lumid->url);
 }
 

@@ -4,7 +4,8 @@
  * 1. libsoup (3.2 to 3.6) says "request-started" when it has accepted a connection, before anything is read, and again
  *    with the first byte of every further request; so a connection is known from its first moment on, and its socket
  *    can be shut down then and at any time: libsoup sees the end of the stream, or a write that fails, and lets go.
- * 2. A connection is over when its GSocket is: a weak reference tells.
+ * 2. A connection is over when its GSocket is: a weak reference tells; libsoup 3.2 keeps the objects of all that were
+ *    plain, for ever, so one that is closed is over too.
  * 3. libsoup takes its listening socket out of the main loop for good when accepting fails once, which it does when
  *    the program has run out of descriptors. The listening sockets are therefore watched at a lower priority: that
  *    watch is called only where libsoup has left a connection waiting, and makes it listen again. */
@@ -196,7 +197,10 @@ static gboolean on_tick(void *context)
     g_hash_table_iter_init(&at, guard->connections);
     while (g_hash_table_iter_next(&at, NULL, &value)) {
         struct connection *connection = value;
-        if (time > connection->until_ns || (connection->until_ns != INT64_MAX && has_left(connection)))
+        if (g_socket_is_closed(connection->socket)) {
+            g_object_weak_unref(G_OBJECT(connection->socket), on_gone, guard);
+            g_hash_table_iter_remove(&at);
+        } else if (time > connection->until_ns || (connection->until_ns != INT64_MAX && has_left(connection)))
             end(connection);
     }
     return G_SOURCE_CONTINUE;

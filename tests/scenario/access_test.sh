@@ -62,7 +62,7 @@ expect 0 "the first user" "$lumi" user add anna --users "$users" --password-file
 await "others are answered on port"
 [ "$(stat -c %a "$users" access/rig.pem access/local.token | tr '\n' ' ')" = "600 600 640 " ] || fail "$(ls -l access)"
 secure=$(sed -n 's/.*answered on port \([0-9]*\),.*/\1/p' log)
-expect_line 2 "answers to its users only: --token-file" "$lumi" capture status
+expect_line 2 "a token is needed: --token-file" "$lumi" capture status
 expect 0 "state" "$lumi" capture status --token-file access/local.token
 expect 0 "state" "$lumi" capture status --lumid "https://localhost:$secure" --ca access/rig.crt --token-file access/local.token
 expect_line 1 "ertificate" "$lumi" capture status --lumid "https://localhost:$secure" --token-file access/local.token
