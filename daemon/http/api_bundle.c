@@ -20,7 +20,6 @@ struct download {
     bool busy;     /* a piece is on its way */
     bool answered; /* the headers are */
     int64_t written_ns;
-    char path[LUMI_SHELF_PATH];
     struct lumi_shelf_bundle *bundle;
     int64_t at, end; /* of what was asked for */
     uint8_t *data;
@@ -61,9 +60,13 @@ static void work(struct lumi_api_job *job)
 {
     struct download *d = (struct download *)job;
 
-    if (!d->bundle)
-        d->code = lumi_shelf_bundle_open(d->path, d->name, &d->bundle, &d->error);
-    else
+    char path[LUMI_SHELF_PATH];
+
+    if (!d->bundle) {
+        d->code = lumi_shelf_find(d->shelf->http->options.folder, d->name, path, &d->error);
+        if (d->code == LUMI_OK)
+            d->code = lumi_shelf_bundle_open(path, d->name, &d->bundle, &d->error);
+    } else
         d->code = lumi_shelf_bundle_read(d->bundle, d->at, d->data, (size_t)MIN((int64_t)PIECE, d->end - d->at),
                                          &d->size, &d->error);
 }
@@ -78,13 +81,27 @@ static void hang_up(struct download *d)
         g_socket_shutdown(socket, TRUE, TRUE, NULL);
 }
 
+/* The length was promised: only breaking off tells. What is written then fails, and the message is finished. */
+static void break_off(struct download *d)
+{
+    hang_up(d);
+    soup_message_body_append(soup_server_message_get_response_body(d->message), SOUP_MEMORY_STATIC, "", 1);
+    d->busy = true;
+    soup_server_message_unpause(d->message);
+}
+
 static void ask(struct download *d)
 {
     d->given = true;
     if (lumi_api_worker_give(d->shelf->carrier, &d->job))
         return;
-    d->given = false; /* cannot be: there are fewer downloads than places */
-    hang_up(d);
+    d->given = false; /* so much is deleted at once */
+    if (d->answered)
+        break_off(d);
+    else {
+        lumi_api_send_problem(d->message, 503, "busy", "too much is done with captures already");
+        soup_server_message_unpause(d->message);
+    }
 }
 
 static void give(struct download *d)
@@ -96,6 +113,7 @@ static void give(struct download *d)
     if (d->at == d->end)
         soup_message_body_complete(body);
     d->busy = true;
+    d->written_ns = now(d->shelf);
     soup_server_message_unpause(d->message);
 }
 
@@ -105,7 +123,6 @@ static void on_wrote_chunk(SoupServerMessage *message, void *context)
 
     (void)message;
     d->busy = false;
-    d->written_ns = now(d->shelf);
     if (d->at < d->end)
         ask(d);
 }
@@ -176,7 +193,6 @@ static void begin(struct download *d)
     soup_message_body_set_accumulate(soup_server_message_get_response_body(d->message), FALSE);
     lumi_api_guard_spare(d->shelf->http->guard, d->message); /* look_after instead */
     d->answered = true;
-    d->written_ns = now(d->shelf);
     d->data = g_malloc(PIECE);
     g_signal_connect(d->message, "wrote-chunk", G_CALLBACK(on_wrote_chunk), d);
     ask(d);
@@ -195,8 +211,8 @@ static void come_back(struct lumi_api_letter *letter, bool dropped)
         begin(d);
     else if (d->code == LUMI_OK)
         give(d);
-    else if (d->answered) /* the length was promised: only breaking off tells */
-        hang_up(d), soup_server_message_unpause(d->message);
+    else if (d->answered)
+        break_off(d);
     else {
         struct lumi_api_answer answer = {0};
         lumi_api_problem_of(&answer, d->code, d->error.text);
@@ -231,13 +247,10 @@ static gboolean on_tick(void *context)
     return G_SOURCE_CONTINUE;
 }
 
-static bool refused(struct lumi_http *http, SoupServerMessage *message, const char *name, char path[LUMI_SHELF_PATH])
+static bool refused(struct lumi_http *http, SoupServerMessage *message)
 {
-    struct lumi_error error;
-
-    if (!http->options.folder || lumi_shelf_find(http->options.folder, name, path, &error) != LUMI_OK)
-        lumi_api_send_problem(message, 404, "notfound",
-                              http->options.folder ? error.text : "there are no captures here");
+    if (!http->options.folder)
+        lumi_api_send_problem(message, 404, "notfound", "there are no captures here");
     else if (http->shelf->downloads->len >= DOWNLOADS)
         lumi_api_send_problem(message, 503, "busy", "so many captures are being downloaded already: try again later");
     else
@@ -256,9 +269,7 @@ static bool take(struct lumi_http *http, SoupServerMessage *message, const char 
 
 void lumi_api_serve_bundle(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
 {
-    char path[LUMI_SHELF_PATH];
-
-    if (refused(http, message, body->part, path) || !take(http, message, body->part))
+    if (refused(http, message) || !take(http, message, body->part))
         return;
     struct download *d = g_new0(struct download, 1);
     d->job.work = work;
@@ -266,7 +277,6 @@ void lumi_api_serve_bundle(struct lumi_http *http, SoupServerMessage *message, c
     d->shelf = http->shelf;
     d->message = g_object_ref(message);
     d->name = g_strdup(body->part);
-    memcpy(d->path, path, sizeof path);
     g_ptr_array_add(http->shelf->downloads, d);
     g_signal_connect(message, "finished", G_CALLBACK(on_finished), d);
     if (!http->shelf->tick)

@@ -77,7 +77,7 @@ static void on_finished(SoupServerMessage *message, void *context)
     struct lumi_api_party *party = find(stream->door, stream->key);
 
     g_signal_handlers_disconnect_by_data(message, stream);
-    if (party) {
+    if (party && party->streams > 0) { /* it may be another of this name by now */
         party->streams--;
         party->seen_ns = lumi_api_now(stream->door->http);
         stream->door->people++;

@@ -13,15 +13,17 @@
 
 #define SECOND INT64_C(1000000000)
 #define HANDSHAKE_MS 10000
+#define FAULT_TEXT 256
 #define AGAIN_MS 250
 #define LOOK_AGAIN_NS (86400 * SECOND) /* at the certificate */
+#define TRY_AGAIN_NS (10 * SECOND)     /* where there is none */
 
 struct stamp {
     dev_t device;
     ino_t file;
     off_t size;
     struct timespec changed;
-    bool there;
+    bool there, unread;
 };
 
 struct lumi_api_secure {
@@ -34,8 +36,10 @@ struct lumi_api_secure {
     bool said;                    /* that it cannot be opened */
     GTlsCertificate *certificate;
     char fingerprint[LUMI_FINGERPRINT];
-    int64_t certified_ns;
+    int64_t certified_ns; /* when that was tried */
     struct stamp stamp;
+    GPtrArray *arrivals;                                 /* whose TLS is being agreed on */
+    char users_fault[FAULT_TEXT], tls_fault[FAULT_TEXT]; /* that were told */
 };
 
 /* ---- looking, in the worker ---- */
@@ -49,8 +53,8 @@ struct look {
     GTlsCertificate *certificate;
     char fingerprint[LUMI_FINGERPRINT];
     int64_t unix_s;
-    struct lumi_error error;
-    int code;
+    struct lumi_error error, tls_error;
+    int code, tls_code; /* of the users; of the certificate: neither says anything of the other */
 };
 
 static void certify(struct look *look)
@@ -61,16 +65,17 @@ static void certify(struct look *look)
     g_autoptr(GError) failed = NULL;
 
     if (!g_tls_backend_supports_tls(g_tls_backend_get_default())) {
-        look->code = lumi_fail(&look->error, LUMI_ERR_UNSUPPORTED, "no TLS on this computer: install glib-networking");
+        look->tls_code =
+            lumi_fail(&look->tls_error, LUMI_ERR_UNSUPPORTED, "no TLS on this computer: install glib-networking");
         return;
     }
-    look->code = lumi_certificate_ensure(path, copy, options->host_name ? options->host_name : g_get_host_name(),
-                                         look->unix_s, look->fingerprint, &look->error);
-    if (look->code != LUMI_OK)
+    look->tls_code = lumi_certificate_ensure(path, copy, options->host_name ? options->host_name : g_get_host_name(),
+                                             look->unix_s, look->fingerprint, &look->tls_error);
+    if (look->tls_code != LUMI_OK)
         return;
     look->certificate = g_tls_certificate_new_from_file(path, &failed);
     if (!look->certificate)
-        look->code = lumi_fail(&look->error, LUMI_ERR_FORMAT, "%s: %s", path, failed->message);
+        look->tls_code = lumi_fail(&look->tls_error, LUMI_ERR_FORMAT, "%s: %s", path, failed->message);
 }
 
 static void work(struct lumi_api_job *job)
@@ -86,7 +91,7 @@ static void work(struct lumi_api_job *job)
         stamp.size = is.st_size;
         stamp.changed = is.st_mtim;
     }
-    look->changed = stamp.there != look->stamp.there || stamp.device != look->stamp.device ||
+    look->changed = look->stamp.unread || stamp.there != look->stamp.there || stamp.device != look->stamp.device ||
                     stamp.file != look->stamp.file || stamp.size != look->stamp.size ||
                     stamp.changed.tv_sec != look->stamp.changed.tv_sec ||
                     stamp.changed.tv_nsec != look->stamp.changed.tv_nsec;
@@ -101,7 +106,7 @@ static void work(struct lumi_api_job *job)
 
 /* A connection whose TLS is being agreed on. */
 struct arrival {
-    struct lumi_api_secure *secure;
+    struct lumi_api_secure *secure; /* NULL: it has ended meanwhile */
     GSocketConnection *connection;
     GIOStream *stream;
     GCancellable *cancellable;
@@ -120,19 +125,34 @@ static gboolean on_patience(void *context)
 
 static const char socket_name[] = "lumi-socket";
 
+/* One of its own, which may hold the socket: the socket keeps the one that it gives out. */
+static GSocketAddress *remote_of(GSocket *socket)
+{
+    g_autoptr(GSocketAddress) kept = g_socket_get_remote_address(socket, NULL);
+    GInetSocketAddress *inet = G_IS_INET_SOCKET_ADDRESS(kept) ? G_INET_SOCKET_ADDRESS(kept) : NULL;
+    GSocketAddress *made =
+        inet ? g_inet_socket_address_new(g_inet_socket_address_get_address(inet), g_inet_socket_address_get_port(inet))
+             : NULL;
+
+    if (made)
+        g_object_set_data_full(G_OBJECT(made), socket_name, g_object_ref(socket), g_object_unref);
+    return made;
+}
+
 static void on_agreed(GObject *object, GAsyncResult *result, void *context)
 {
     struct arrival *arrival = context;
     bool good = g_tls_connection_handshake_finish(G_TLS_CONNECTION(object), result, NULL);
     GSocket *socket = g_socket_connection_get_socket(arrival->connection);
     g_autoptr(GSocketAddress) local = g_socket_get_local_address(socket, NULL);
-    g_autoptr(GSocketAddress) remote = g_socket_get_remote_address(socket, NULL);
+    g_autoptr(GSocketAddress) remote = remote_of(socket);
 
-    if (good && local && remote && arrival->secure->listener) {
-        g_object_set_data_full(G_OBJECT(remote), socket_name, g_object_ref(socket), g_object_unref);
+    if (good && local && remote && arrival->secure && arrival->secure->listener)
         soup_server_accept_iostream(arrival->secure->door->http->server, arrival->stream, local, remote, NULL);
-    } else
+    else
         g_io_stream_close(G_IO_STREAM(arrival->connection), NULL, NULL);
+    if (arrival->secure)
+        g_ptr_array_remove_fast(arrival->secure->arrivals, arrival);
     lumi_api_drop(&arrival->timer);
     g_object_unref(arrival->cancellable);
     g_object_unref(arrival->stream);
@@ -153,6 +173,7 @@ static void arrive(struct lumi_api_secure *secure, GSocketConnection *connection
     made = g_new0(struct arrival, 1);
     *made = (struct arrival){.secure = secure, .connection = g_object_ref(connection), .stream = stream};
     made->cancellable = g_cancellable_new();
+    g_ptr_array_add(secure->arrivals, made);
     made->timer = lumi_api_attach(g_timeout_source_new(HANDSHAKE_MS), G_PRIORITY_DEFAULT, on_patience, made);
     g_tls_connection_handshake_async(G_TLS_CONNECTION(stream), G_PRIORITY_DEFAULT, made->cancellable, on_agreed, made);
 }
@@ -250,14 +271,27 @@ static void close_listener(struct lumi_api_secure *secure)
 
 /* ---- what has been found ---- */
 
+/* Told once, however often it is met; NULL: it is gone. */
+static void complain(char told[FAULT_TEXT], const char *text)
+{
+    if (text && strncmp(told, text, FAULT_TEXT - 1))
+        g_warning("HTTP: %s", text);
+    g_strlcpy(told, text ? text : "", FAULT_TEXT);
+}
+
+/* Who was a user stays one while the file cannot be read, which must not open the door; it is read again until it can:
+ * that it may be read now need not show in its stamp. Who is a user does not hang on there being a certificate. */
 static void take(struct lumi_api_door *door, struct look *look)
 {
     struct lumi_api_secure *secure = door->secure;
 
-    secure->stamp = look->stamp;
-    if (look->code != LUMI_OK) /* who was a user stays one: what cannot be read must not open the door */
-        g_warning("HTTP: %s", look->error.text);
-    else if (look->changed) {
+    complain(secure->users_fault, look->code != LUMI_OK ? look->error.text : NULL);
+    if (look->certificate || look->tls_code != LUMI_OK) {
+        complain(secure->tls_fault, look->tls_code != LUMI_OK ? look->tls_error.text : NULL);
+        secure->certified_ns = lumi_api_now(door->http);
+    }
+    secure->stamp = look->code == LUMI_OK ? look->stamp : (struct stamp){.unread = true};
+    if (look->code == LUMI_OK && look->changed) {
         door->users = look->users;
         lumi_sessions_sweep(door->sessions, lumi_api_now(door->http), &door->users);
         lumi_pairing_sweep(&door->pairing, lumi_api_now(door->http), &door->users);
@@ -267,8 +301,6 @@ static void take(struct lumi_api_door *door, struct look *look)
         g_set_object(&secure->certificate, look->certificate);
         g_strlcpy(secure->fingerprint, look->fingerprint, sizeof secure->fingerprint);
     }
-    if (look->certify || look->certificate)
-        secure->certified_ns = lumi_api_now(door->http);
     if (door->users.count)
         open_listener(secure);
     else if (secure->listener) {
@@ -300,7 +332,8 @@ static struct look *make_look(struct lumi_api_door *door)
     made->stamp = secure->stamp;
     made->unix_s = lumi_api_unix_us(door->http) / 1000000;
     made->certify =
-        door->users.count && (!secure->certificate || lumi_api_now(door->http) - secure->certified_ns > LOOK_AGAIN_NS);
+        door->users.count && (!secure->certified_ns || lumi_api_now(door->http) - secure->certified_ns >
+                                                           (secure->certificate ? LOOK_AGAIN_NS : TRY_AGAIN_NS));
     return made;
 }
 
@@ -442,6 +475,7 @@ int lumi_api_secure_create(struct lumi_api_door *door, struct lumi_error *error)
 
     door->secure = g_new0(struct lumi_api_secure, 1);
     door->secure->door = door;
+    door->secure->arrivals = g_ptr_array_new();
     if (wanted && *wanted)
         LUMI_TRY(lumi_api_listen_parse(wanted, &listen, error));
     if (!door->folder)
@@ -463,6 +497,13 @@ void lumi_api_secure_destroy(struct lumi_api_door *door)
         write_sessions(door, text, NULL);
     }
     close_listener(secure);
+    for (guint i = 0; i < secure->arrivals->len; i++) {
+        struct arrival *arrival = secure->arrivals->pdata[i];
+        arrival->secure = NULL;
+        lumi_api_drop(&arrival->timer);
+        g_cancellable_cancel(arrival->cancellable);
+    }
+    g_ptr_array_unref(secure->arrivals);
     g_clear_object(&secure->certificate);
     g_free(secure);
 }

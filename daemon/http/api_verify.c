@@ -183,7 +183,11 @@ int lumi_api_shelf_verify(struct lumi_api_shelf *shelf, const char *name, const 
 struct verify_job {
     struct lumi_api_job job;
     struct lumi_api_shelf *shelf;
+    SoupServerMessage *message; /* until it is answered */
+    bool gone;                  /* who asked has hung up */
     char *name, path[LUMI_SHELF_PATH];
+    int code;
+    struct lumi_error error;
 };
 
 static void work(struct lumi_api_job *job)
@@ -215,34 +219,81 @@ const struct lumi_api_field lumi_api_verify_fields[] = {
     {0},
 };
 
+static void on_finished(SoupServerMessage *message, void *context)
+{
+    (void)message;
+    ((struct verify_job *)context)->gone = true;
+}
+
+/* In the carrier: the server's thread waits for no disk. */
+static void look(struct lumi_api_job *job)
+{
+    struct verify_job *asked = (struct verify_job *)job;
+
+    asked->code = lumi_shelf_find(asked->shelf->http->options.folder, asked->name, asked->path, &asked->error);
+}
+
+/* What is given to the worker here until this thread reads its letter. */
+static void begin(struct verify_job *asked, struct lumi_api_answer *answer)
+{
+    char *told;
+
+    asked->job.work = work;
+    asked->job.letter.read = done;
+    if (asked->code != LUMI_OK)
+        lumi_api_problem_of(answer, asked->code, asked->error.text);
+    else if (!lumi_api_worker_give(asked->shelf->slow, &asked->job))
+        lumi_api_problem(answer, 503, "busy", "too many captures wait to be verified already");
+    else {
+        told = describe(asked->name, "running", 0, 0, "");
+        lumi_api_events_latest(asked->shelf->http->events, "verify", asked->name, g_strdup(told));
+        lumi_api_answer(answer, 202, "application/json", told);
+        return;
+    }
+    done(&asked->job.letter, false);
+}
+
+static void looked(struct lumi_api_letter *letter, bool dropped)
+{
+    struct verify_job *asked = (struct verify_job *)letter;
+    SoupServerMessage *message = asked->message;
+    const bool gone = asked->gone;
+    struct lumi_api_answer answer = {0};
+
+    g_signal_handlers_disconnect_by_data(message, asked);
+    if (dropped)
+        done(letter, true);
+    else
+        begin(asked, &answer);
+    if (!dropped && !gone) {
+        lumi_api_send(message, &answer);
+        soup_server_message_unpause(message);
+    }
+    g_free(answer.text);
+    g_object_unref(message);
+}
+
 void lumi_api_serve_verify(struct lumi_http *http, SoupServerMessage *message, const struct lumi_api_body *body)
 {
     struct lumi_api_shelf *shelf = http->shelf;
     const char *name = body->values[0].string;
-    struct lumi_api_answer answer = {0};
-    char path[LUMI_SHELF_PATH];
-    struct lumi_error error;
 
-    if (!http->options.folder || lumi_shelf_find(http->options.folder, name, path, &error) != LUMI_OK) {
-        lumi_api_send_problem(message, 404, "notfound",
-                              http->options.folder ? error.text : "there are no captures here");
+    if (!http->options.folder) {
+        lumi_api_send_problem(message, 404, "notfound", "there are no captures here");
         return;
     }
     if (!lumi_api_shelf_take(shelf, message, name, "verified"))
         return;
     struct verify_job *asked = g_new0(struct verify_job, 1);
-    asked->job.work = work;
-    asked->job.letter.read = done;
+    asked->job.work = look;
+    asked->job.letter.read = looked;
     asked->shelf = shelf;
+    asked->message = g_object_ref(message);
     asked->name = g_strdup(name);
-    memcpy(asked->path, path, sizeof path);
-    if (!lumi_api_worker_give(shelf->slow, &asked->job)) {
-        done(&asked->job.letter, false);
-        lumi_api_send_problem(message, 503, "busy", "too many captures wait to be verified already");
+    g_signal_connect(message, "finished", G_CALLBACK(on_finished), asked);
+    soup_server_message_pause(message);
+    if (lumi_api_worker_give(shelf->carrier, &asked->job))
         return;
-    }
-    char *told = describe(name, "running", 0, 0, "");
-    lumi_api_events_latest(http->events, "verify", name, g_strdup(told));
-    lumi_api_answer(&answer, 202, "application/json", told);
-    lumi_api_send(message, &answer);
+    asked->code = lumi_fail(&asked->error, LUMI_ERR_BUSY, "too much is done with captures already");
+    looked(&asked->job.letter, false);
 }

@@ -1,5 +1,4 @@
 /* The program that draws views of the light field so far: its life, and who waits for it. */
-#define _DEFAULT_SOURCE /* syscall */
 #include "daemon/preview/preview_field.h"
 
 #include "daemon/preview/field_answer.h"
@@ -11,14 +10,13 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #define UNASKED_S 60
 #define LATE_S 20     /* a picture that takes longer is not waited for */
+#define SILENT_S 300  /* who was asked and says nothing for so long hangs */
 #define BACK_OFF_S 60 /* the longest wait before it is started again */
 #define WAITING_MOST 16
 
@@ -43,6 +41,7 @@ struct lumi_field {
     bool drawing;
     uint32_t last_id;
     gint64 asked_us;    /* when somebody last asked */
+    gint64 silent_us;   /* since when it has not answered; 0: nothing is left to answer */
     gint64 start_us;    /* not before */
     int failures;       /* in a row */
     bool said_anything; /* since it was started */
@@ -100,8 +99,11 @@ static void send_next(struct lumi_field *field)
     const int size = snprintf(line, sizeof line, "view %u %s %s %s %s %s %s %d %d\n", question->id, numbers[0],
                               numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], gaze->width, gaze->height);
     /* It has answered all before this one: a line always has room. Where it has not, it is dead, and found so. */
-    if (send(field->socket, line, (size_t)size, MSG_NOSIGNAL | MSG_DONTWAIT) == size)
-        field->drawing = true;
+    if (send(field->socket, line, (size_t)size, MSG_NOSIGNAL | MSG_DONTWAIT) != size)
+        return;
+    field->drawing = true;
+    if (!field->silent_us)
+        field->silent_us = g_get_monotonic_time();
 }
 
 /* ---- what it says ---- */
@@ -112,6 +114,7 @@ static void take_answer(void *context, const struct lumi_field_answer *said)
     struct lumi_field_result result = {.text = said->text};
 
     field->said_anything = true;
+    field->silent_us = 0;
     field->failures = 0;
     if (said->kind == LUMI_FIELD_NEWS) {
         field->frames = said->frames;
@@ -184,6 +187,7 @@ static void close_all(struct lumi_field *field)
     field->socket = -1;
     field->pid = 0;
     field->drawing = false;
+    field->silent_us = 0;
     lumi_field_reader_finish(&field->reader);
 }
 
@@ -234,17 +238,16 @@ static void stop(struct lumi_field *field)
     close_all(field);
 }
 
-/* After fork: what nobody else wants of processor and disk, and no life without us. The server's thread, which starts
- * it, hears no signals; it does. */
-static void be_humble(void *context)
+/* After fork: no life without us. The server's thread, which starts it, hears no signals; it does. That thread waits
+ * until the program has begun, and an emergency stop with it: so it takes what nobody else wants of processor and disk
+ * (lumi_preview_humble) not before it has been read from the disk. */
+static void be_ready(void *context)
 {
     sigset_t none;
 
     (void)context;
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
-    setpriority(PRIO_PROCESS, 0, 19);
-    syscall(SYS_ioprio_set, 1, 0, 3 << 13); /* ioprio_set(2): this process, class idle */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
 }
 
@@ -277,7 +280,7 @@ static bool spawn(struct lumi_field *field, int ends[2])
         return false;
     }
     if (g_spawn_async_with_fds(NULL, words, NULL, (GSpawnFlags)(G_SPAWN_DO_NOT_REAP_CHILD | G_SPAWN_SEARCH_PATH),
-                               be_humble, NULL, &field->pid, ends[1], ends[1], -1, &problem)) {
+                               be_ready, NULL, &field->pid, ends[1], ends[1], -1, &problem)) {
         close(ends[1]);
         return true;
     }
@@ -325,6 +328,8 @@ static gboolean on_tick(void *context)
         /* What is being drawn is not asked for again before its answer is here: `id` tells them apart. */
         answer(field, i, &late);
     }
+    if (field->pid && field->silent_us && now - field->silent_us > (gint64)SILENT_S * G_USEC_PER_SEC)
+        kill(field->pid, SIGKILL); /* on_end goes on */
     if (now - field->asked_us < (gint64)UNASKED_S * G_USEC_PER_SEC)
         return G_SOURCE_CONTINUE;
     stop(field);

@@ -447,6 +447,43 @@ static void who_does_not_read_holds_nobody_up_and_keeps_the_capture(void **state
     close(fd);
 }
 
+/* Under the reader's hands: nothing but the end of the connection can tell, and nobody has the capture then. */
+static void what_is_cut_short_while_it_is_carried_away_breaks_off(void **state)
+{
+    static const char request[] = "GET /api/v1/captures/" NAME "/bundle.tar HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    struct lumi_capture *capture;
+    char path[2 * PATH_SIZE];
+
+    snprintf(path, sizeof path, "%s/" NAME, folder);
+    OK(lumi_capture_open(path, LUMI_CAPTURE_WRITE, &capture, error));
+    OK(lumi_capture_set_meta(capture, "title", "large", error));
+    g_autofree char *large = g_malloc0(32 << 20);
+    struct lumi_capture_file file = small_file();
+    OK(lumi_capture_store_bytes(capture, add_frame(capture, 1, "c00-9"), large, 32 << 20, &file, error));
+    OK(lumi_capture_seal(capture, NULL, error));
+    lumi_capture_close(capture);
+    int fd = fixture_connect(*state);
+    fixture_send(fd, request, strlen(request));
+    for (int i = 0; i < 2000; i++) {
+        char byte;
+        if (recv(fd, &byte, 1, MSG_PEEK) == 1)
+            break;
+        fixture_wait();
+    }
+    shell("find '%s/" NAME "/data' -size +16M -exec truncate -s 1000 {} +", folder);
+    g_string_free(fixture_receive(fd, NULL), TRUE); /* ends */
+    close(fd);
+    int status = 0;
+    for (int i = 0; i < 2000 && status != 202; i++) {
+        struct answer answer = fixture_ask(*state, "POST", "/api/v1/captures/delete", JSON_TYPE,
+                                           "{\"capture\":\"" NAME "\",\"word\":\"" NAME "\"}");
+        status = answer.status;
+        answer_clear(&answer);
+        fixture_wait();
+    }
+    assert_int_equal(status, 202);
+}
+
 int main(void)
 {
 #define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
@@ -465,6 +502,7 @@ int main(void)
         CASE(a_bundle_goes_on_where_it_broke_off),
         CASE(what_is_open_is_not_carried_away),
         CASE(who_does_not_read_holds_nobody_up_and_keeps_the_capture),
+        CASE(what_is_cut_short_while_it_is_carried_away_breaks_off),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -4,6 +4,7 @@
 #include "tests/unit/api_fixture.h"
 
 #include <gio/gio.h>
+#include <sys/stat.h>
 
 #define SECOND INT64_C(1000000000)
 #define PASSWORD "a good password"
@@ -203,6 +204,28 @@ static void others_are_answered_from_the_first_user_to_the_last(void **state)
     assert_string_equal(first, again); /* phones know it by this */
 }
 
+/* A full disk, a folder that went away: whoever was made a user must be one, and who is none stays outside. */
+static void there_are_users_even_where_no_certificate_can_be_made(void **state)
+{
+    g_autofree char *path = g_build_filename(folder, "rig.pem", NULL);
+    int status = 0;
+
+    write_users(false);
+    for (int i = 0; i < 2000 && secure_port(*state); i++)
+        fixture_wait();
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(mkdir(path, 0700), 0); /* no file can take its place */
+    write_users(true);
+    for (int i = 0; i < 2000 && status != 401; i++) {
+        struct answer answer = fixture_ask(*state, "GET", "/api/v1/session/people", NULL, NULL);
+        status = answer.status;
+        answer_clear(&answer);
+        fixture_wait();
+    }
+    assert_int_equal(rmdir(path), 0);
+    assert_int_equal(status, 401);
+}
+
 static void over_tls_nobody_is_let_in_without_a_session(void **state)
 {
     static const char *const closed[] = {"/api/v1/status", "/api/v1/events", "/metrics", "/openapi.json", "/nothing"};
@@ -309,6 +332,7 @@ int main(void)
 #define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         CASE(others_are_answered_from_the_first_user_to_the_last),
+        CASE(there_are_users_even_where_no_certificate_can_be_made),
         CASE(over_tls_nobody_is_let_in_without_a_session),
         CASE(over_tls_the_cookie_is_this_hosts_alone),
         CASE(a_body_that_is_too_large_is_refused_over_tls_as_well),
