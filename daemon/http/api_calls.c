@@ -235,8 +235,13 @@ static const struct lumi_api_field process_fields[] = {
     {0},
 };
 
+/* A name is that of a capture in lumid's folder, as the list of captures has it; otherwise it is a path. */
 static void post_processing(struct lumi_http *http, struct lumi_api_answer *answer, const struct lumi_api_body *body)
 {
+    const char *given = body->values[0].string;
+    g_autofree char *path = strchr(given, '/') || !http->options.folder
+                                ? g_strdup(given)
+                                : g_build_filename(http->options.folder, given, NULL);
     struct lumi_error error;
     int code;
 
@@ -244,7 +249,7 @@ static void post_processing(struct lumi_http *http, struct lumi_api_answer *answ
         lumi_api_problem(answer, 409, "busy", "the configuration names no processing command");
         return;
     }
-    code = lumi_handover_give(http->options.handover, body->values[0].string, body->values[1].boolean, &error);
+    code = lumi_handover_give(http->options.handover, path, body->values[1].boolean, &error);
     if (code != LUMI_OK)
         lumi_api_problem_of(answer, code, error.text);
     else {

@@ -90,7 +90,8 @@ export class Bench {
         const file = join(this.folder, "lumid.conf");
         let text = readFileSync(file, "utf8");
 
-        // The pictures are small: what is smeared is judged where a test is about it.
+        this.access = join(this.folder, "access");
+        // The pictures are small: what is smeared is no matter here.
         for (const [group, keys] of Object.entries({ judge: { blur_pixels: 12 }, ...settings })) {
             const lines = Object.entries(keys).map(([key, value]) => `${key} = ${value}\n`).join("");
             text = text.includes(`[${group}]\n`) ? text.replace(`[${group}]\n`, `[${group}]\n${lines}`)
@@ -138,8 +139,10 @@ export class Bench {
 
     // As `lumi capture` asks, beside any browser.
     async ask(path, body) {
-        const options = body === undefined ? {} : { method: "POST", body: JSON.stringify(body),
-            headers: { "Content-Type": "application/json" } };
+        const token = join(this.access, "local.token");
+        const headers = existsSync(token) ? { Authorization: `Bearer ${readFileSync(token, "utf8").trim()}` } : {};
+        const options = body === undefined ? { headers } : { method: "POST", body: JSON.stringify(body),
+            headers: { ...headers, "Content-Type": "application/json" } };
         const answer = await fetch(`http://localhost:${PORT}${path}`, options);
         return { status: answer.status, json: await answer.json() };
     }
@@ -185,29 +188,27 @@ export class Bench {
         const browser = await this.browser(flags);
         const context = await browser.newContext({ ...SIZES[size], colorScheme: theme, locale: language,
             baseURL: origin ?? `http://localhost:${port}`, acceptDownloads: true, ...more });
-        return this.tab(context, path, allow);
+        return this.tab(context, path, allow, origin);
     }
 
-    async tab(context, path = "/", allow = []) {
+    async tab(context, path, allow, origin) {
         const page = await context.newPage();
         page.setDefaultTimeout(15000);
-        this.guard(page, [...allow]);
+        this.guard(page, [...allow], origin ? new URL(origin).hostname : "localhost");
         this.pages.push(page);
         await page.goto(path);
         return page;
     }
 
-    guard(page, allowed) {
+    guard(page, allowed, host) {
         const wrong = [];
 
-        if (process.env.LUMI_BROWSER_ALLOW)
-            allowed.push(new RegExp(process.env.LUMI_BROWSER_ALLOW));
         page.wrong = wrong;
         page.allow = (pattern) => allowed.push(pattern);
         page.at = (test, more = "") => page.locator(`[data-test="${test}"]${more}`);
         page.on("request", (request) => {
             const url = new URL(request.url());
-            if (url.protocol.startsWith("http") && !["localhost", "127.0.0.1"].includes(url.hostname))
+            if (url.protocol.startsWith("http") && url.hostname !== host)
                 wrong.push(`a request to ${request.url()}`);
         });
         page.on("console", (message) => {

@@ -8,7 +8,7 @@ import { spawnSync } from "node:child_process";
 import { check, until } from "./bench.mjs";
 import { connected, goTo, preflight, press, seesState, sphere, usePlan } from "./operator.mjs";
 
-export const rig = { arc: "4x10:0.2", seconds: 2, settings: { process: { command: "cp -r %c %c.work" } } };
+export const rig = { arc: "4x10:0.2", seconds: 2, settings: { process: { command: "sleep 1" } } };
 const FRAMES = 40;
 
 async function badPlan(bench) {
@@ -99,15 +99,33 @@ async function captures(bench) {
     check(list.status === 0 && list.stdout.includes("manifest-sha256.txt"), `the bundle is no capture: ${list.stderr}`);
     bench.figure("bundle", `${statSync(file).size} bytes, sha256 ${createHash("sha256").update(readFileSync(file)).digest("hex").slice(0, 12)}`);
 
-    await capture.locator('[data-test="capture-delete"]').click();
+    await capture.locator('[data-test="capture-process"]').click();
+    await until("it was processed again", () => bench.log().match(/processing is done/g)?.length === 2);
+
+    const stored = async () => (await bench.ask("/api/v1/captures")).json.captures.length;
+    const word = async (text) => {
+        await capture.locator('[data-test="capture-delete"]').click();
+        await page.at("delete-by-word").check();
+        await page.at("delete-word").fill(text);
+    };
+    await word(`${name}x`);
     await bench.picture(page, "delete-asks");
+    check(await page.at("dialog-confirm").isDisabled() || await refusedWord(page), "a wrong word is taken");
     await page.at("dialog-cancel").click();
-    check((await bench.ask("/api/v1/captures")).json.captures.length === 1, "it was deleted though nobody said so");
-    check(name, "the capture has no name");
+    check(await stored() === 1, "it was deleted though nobody said so");
+    await word(name);
+    await page.at("dialog-confirm").click();
+    await until("it is deleted", async () => await stored() === 0);
+    await until("it is gone from the list", async () => await page.at("capture").count() === 0);
+}
+
+async function refusedWord(page) {
+    await page.at("dialog-confirm").click();
+    return page.at("dialog-confirm").isVisible();
 }
 
 export const cases = [
     ["a plan that cannot be run is said at its line, and start cannot be pressed", badPlan],
     ["a sweep is watched to its end by two browsers, paused, and one is loaded anew", sweep],
-    ["a capture is verified, downloaded, and not deleted without a word", captures],
+    ["a capture is verified, downloaded, processed, and deleted by its name only", captures],
 ];
