@@ -101,6 +101,22 @@ static void by_session(struct lumi_http *http, SoupServerMessage *message, struc
     g_strlcpy(who->secret, secret, sizeof who->secret);
 }
 
+#define STRANGERS_BODY 4096 /* a login is no longer */
+
+size_t lumi_api_body_most(struct lumi_http *http, SoupServerMessage *message)
+{
+    const char *given = soup_message_headers_get_one(soup_server_message_get_request_headers(message), "Authorization");
+    struct lumi_api_visitor who = {.tls = lumi_api_is_tls(http, message)};
+    const bool users = http->door->users.count > 0;
+
+    say_where(message, &who);
+    if (by_token(http, given, &who) || (!users && who.here))
+        return http->options.body_max;
+    if (users)
+        by_session(http, message, &who);
+    return who.role == LUMI_API_ANYBODY ? MIN(http->options.body_max, STRANGERS_BODY) : http->options.body_max;
+}
+
 /* ---- whether it may ---- */
 
 static bool turn_away(SoupServerMessage *message, unsigned status, const char *word, const char *detail)

@@ -134,6 +134,8 @@ void lumi_api_door_close(struct lumi_api_door *door);
 void lumi_api_door_destroy(struct lumi_api_door *door);
 /* False: whoever asks may not, and is answered already. */
 bool lumi_api_admit(struct lumi_http *http, SoupServerMessage *message, const char *path, enum lumi_api_role role);
+/* Bytes of a body that are taken of whoever sends this: before a login there is room for that alone. */
+size_t lumi_api_body_most(struct lumi_http *http, SoupServerMessage *message);
 /* The connection's, also where TLS stands between. NULL: it is closed. */
 GSocket *lumi_api_socket(SoupServerMessage *message);
 bool lumi_api_is_tls(const struct lumi_http *http, SoupServerMessage *message);

@@ -29,6 +29,7 @@ static void on_early(SoupServer *server, SoupServerMessage *message, const char 
     struct lumi_http *http = context;
     SoupMessageHeaders *headers = soup_server_message_get_request_headers(message);
     goffset length = soup_message_headers_get_content_length(headers);
+    size_t most = length > 0 ? lumi_api_body_most(http, message) : 0;
     g_autofree char *text = NULL;
 
     (void)server;
@@ -36,9 +37,9 @@ static void on_early(SoupServer *server, SoupServerMessage *message, const char 
     (void)query;
     if (soup_message_headers_get_encoding(headers) == SOUP_ENCODING_CHUNKED)
         lumi_api_refuse_early(http, message, 411, "length", "a body must say how long it is (Content-Length)");
-    else if (length > 0 && (size_t)length > http->options.body_max) {
-        text =
-            g_strdup_printf("a body of %" G_GOFFSET_FORMAT " bytes; %zu are the most", length, http->options.body_max);
+    else if (length > 0 && (size_t)length > most) {
+        text = g_strdup_printf("a body of %" G_GOFFSET_FORMAT " bytes; %zu are the most%s", length, most,
+                               most < http->options.body_max ? " before somebody is logged in" : "");
         lumi_api_refuse_early(http, message, 413, "limit", text);
     }
 }

@@ -25,9 +25,10 @@ int lumi_shelf_take_away(const char *folder, const char *name, struct lumi_error
     fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (fd < 0)
         return lumi_fail_errno(error, path, "opening it");
-    snprintf(gone, sizeof gone, "%s/" DELETED "%s", folder, name);
+    /* As much of its name as leaves room for the rest. */
+    snprintf(gone, sizeof gone, "%s/" DELETED "%.200s", folder, name);
     for (int i = 2; !lstat(gone, &is) && i < 1000; i++) /* one of this name that is not quite removed yet */
-        snprintf(gone, sizeof gone, "%s/" DELETED "%s-%d", folder, name, i);
+        snprintf(gone, sizeof gone, "%s/" DELETED "%.200s-%d", folder, name, i);
     if (flock(fd, LOCK_EX | LOCK_NB))
         code = lumi_fail(error, LUMI_ERR_BUSY, "%s: it is being written", path);
     else if (rename(path, gone))
@@ -99,9 +100,11 @@ int lumi_shelf_empty(const char *folder, bool (*ending)(void *context), void *co
 
     if (!directory)
         return lumi_fail_errno(error, folder, "reading it");
-    while (code == LUMI_OK && (entry = readdir(directory)))
-        if (!strncmp(entry->d_name, DELETED, strlen(DELETED)))
-            code = remove_entry(&e, dirfd(directory), entry->d_name, 0);
+    while (code != LUMI_ERR_CANCELLED && (entry = readdir(directory)))
+        if (!strncmp(entry->d_name, DELETED, strlen(DELETED))) { /* one that stays keeps no other */
+            const int removed = remove_entry(&e, dirfd(directory), entry->d_name, 0);
+            code = removed != LUMI_OK ? removed : code;
+        }
     closedir(directory);
     return code;
 }

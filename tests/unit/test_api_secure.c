@@ -264,6 +264,19 @@ static void a_body_that_is_too_large_is_refused_over_tls_as_well(void **state)
     expect(ask(secure_port(*state), "POST", "/api/v1/session/login", JSON_TYPE, huge), 413, NULL);
 }
 
+static void who_is_not_logged_in_has_no_room_for_more_than_a_login(void **state)
+{
+    int port = secure_port(*state);
+    struct login login = log_in(port);
+    g_autofree char *head =
+        g_strdup_printf(JSON_TYPE "Cookie: __Host-lumid=%s\r\nX-Lumid-Csrf: %s\r\n", login.secret, login.csrf);
+    g_autofree char *large = g_strnfill(5000, ' ');
+
+    expect(ask(port, "POST", "/api/v1/session/revoke", JSON_TYPE, large), 413, "before somebody is logged in");
+    expect(ask(port, "POST", "/api/v1/session/revoke", head, large), 400, NULL); /* it was read */
+    forget(&login);
+}
+
 static void a_stream_over_tls_ends_with_its_session(void **state)
 {
     int port = secure_port(*state);
@@ -336,6 +349,7 @@ int main(void)
         CASE(over_tls_nobody_is_let_in_without_a_session),
         CASE(over_tls_the_cookie_is_this_hosts_alone),
         CASE(a_body_that_is_too_large_is_refused_over_tls_as_well),
+        CASE(who_is_not_logged_in_has_no_room_for_more_than_a_login),
         CASE(a_stream_over_tls_ends_with_its_session),
         CASE(who_begins_tls_and_does_not_go_on_is_hung_up_on),
         CASE(connections_that_wait_for_tls_are_counted),
