@@ -130,7 +130,8 @@ static int make_header(const struct lumi_shelf_bundle *b, struct part *part, con
     code = used && used % BLOCK == 0 ? LUMI_OK : LUMI_ERR_INTERNAL;
 done:
     if (archive) {
-        archive_write_fail(archive); /* the file itself is not its business */
+        archive_write_fail(archive);  /* the file itself is not its business */
+        archive_write_close(archive); /* which it does not do by itself then, nor let go of what it has */
         archive_write_free(archive);
     }
     archive_entry_free(entry);
