@@ -36,7 +36,7 @@ export async function preflight(page) {
         const checks = page.at("check");
         return await checks.count() > 3 && await page.at("check", '[data-verdict="undecided"]').count() === 0 &&
             ["idle", "red"].includes(await stateOf(page));
-    });
+    }, 90); // a test picture that is lost is waited for
     return page.at("check").evaluateAll((all) =>
         Object.fromEntries(all.map((one) => [one.dataset.name, one.dataset.verdict])));
 }
