@@ -41,9 +41,12 @@ async function clickToRest(bench, page) {
 }
 
 async function clearAndGoOn(bench, page) {
+    const stands = async () => (await bench.ask("/api/v1/status")).json.rig.faults.includes("estop");
+
     await seesState(page, "interrupted");
+    await until("the board tells of the stop", stands); // lumid clears what it knows of
     await control(page, "clear");
-    await until("the stop is cleared", async () => !(await bench.ask("/api/v1/status")).json.rig.faults.includes("estop"));
+    await until("the stop is cleared", async () => !await stands());
     await press(page, "resume");
     await seesState(page, "sweeping");
 }
