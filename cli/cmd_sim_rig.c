@@ -148,6 +148,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
 {
     static struct sim_fault_script script;
     struct sigaction action = {.sa_handler = on_signal};
+    g_autofree char *own_program = g_file_read_link("/proc/self/exe", NULL); /* of a build that is not installed too */
     struct sim_rig_processes rig;
     char **command = argc > 1 ? argv + 1 + !strcmp(argv[1], "--") : NULL;
 
@@ -178,6 +179,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     rig.patience = patience;
     rig.port = port;
     rig.process = process;
+    rig.preview = own_program;
     rig.stop = &stop;
     rig.ready = ready;
     rig.command = command && *command ? command : NULL;

@@ -98,7 +98,8 @@ void lumi_attempts_good(struct lumi_attempts *attempts, int64_t now_ns, const vo
 
     if (!here && now_ns >= address->known_ns)
         attempts->all_ns -= ALL_EVERY;
-    address->failed = 0;
+    if (address->failed > 0)
+        address->failed--;
     address->until_ns = 0;
     address->known_ns = now_ns + KNOWN_FOR;
 }

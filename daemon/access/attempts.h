@@ -16,7 +16,7 @@ void lumi_attempts_destroy(struct lumi_attempts *attempts);
 /* One more from this address (`key`, an IPv6 one by its network); `here`: this computer. 0: go on, it counts as one
  * that failed until lumi_attempts_good. Otherwise it is not to be looked at, and this is how long to wait. */
 int64_t lumi_attempts_ask(struct lumi_attempts *attempts, int64_t now_ns, const void *key, size_t size, bool here);
-/* It was right. */
+/* It was right, and is no failed one; those before it stay: who has a name of their own guesses another's no faster. */
 void lumi_attempts_good(struct lumi_attempts *attempts, int64_t now_ns, const void *key, size_t size, bool here);
 
 #endif

@@ -1,4 +1,5 @@
 /* lumid: the rig's daemon. */
+#include "daemon/access/users.h"
 #include "daemon/lumid/config.h"
 #include "daemon/lumid/service.h"
 #include "proto/base/memory.h"
@@ -14,6 +15,19 @@ static void problem(void *context, const char *text)
     fprintf(stderr, "lumid: %s\n", text);
 }
 
+/* A file of users that cannot be read keeps lumid from starting: nobody is let in by mistake. */
+static int check_users(const struct lumi_config *config)
+{
+    g_autofree struct lumi_users *users = g_new0(struct lumi_users, 1);
+    g_autofree char *path = g_build_filename(config->access, "users", NULL);
+    struct lumi_error error;
+    int code = config->access[0] ? lumi_users_load(path, users, &error) : LUMI_OK;
+
+    if (code != LUMI_OK)
+        problem(NULL, error.text);
+    return code;
+}
+
 static int check(const char *path)
 {
     struct lumi_config *config = g_new(struct lumi_config, 1);
@@ -25,6 +39,8 @@ static int check(const char *path)
         code = lumi_config_check_host(config, path, problem, NULL, &error);
     else if (code != LUMI_ERR_FORMAT)
         fprintf(stderr, "lumid: %s\n", error.text);
+    if (code == LUMI_OK)
+        code = check_users(config);
     if (code == LUMI_OK)
         printf("%s: good: %d cameras, captures in %s\n", path, config->engine.camera_count, config->engine.folder);
     g_free(config);

@@ -79,6 +79,10 @@ static int write_configuration(const struct sim_rig_processes *rig, struct lumi_
                            "\n[capture]\nfolder = %s\nframe_patience_s = %g\n"
                            "memory = 256M\n\n[http]\nlisten = localhost:%d\nsecure = *:%d\naccess = %s/access\n",
                            captures, rig->patience, rig->port, rig->port ? rig->port + 1 : 0, rig->folder);
+    if (rig->preview) {
+        g_autofree char *quoted = g_shell_quote(rig->preview);
+        g_string_append_printf(text, "\n[preview]\ncommand = %s preview %%c --serve\n", quoted);
+    }
     if (rig->process)
         g_string_append_printf(text, "\n[process]\ncommand = %s\n", rig->process);
     for (int i = 0; i < rig->rig.camera_count; i++)

@@ -31,6 +31,7 @@ struct sim_rig_processes {
     double patience;     /* s, until a frame that does not come is taken again: drawing may be slow */
     int port;            /* of lumid's API */
     const char *process; /* command after a capture, or NULL */
+    const char *preview; /* the program that draws the light field so far, or NULL: lumid's own choice */
     const volatile sig_atomic_t *stop;
     void (*ready)(const struct sim_rig_processes *rig); /* when all run; or NULL */
     /* Started then, in the same network, with LUMI_SIM_RIG=folder; all ends when it does. Ends with NULL; or NULL. */

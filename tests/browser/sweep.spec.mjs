@@ -1,6 +1,6 @@
 // A capture as a crew takes it: a plan that cannot be run, one that can; the preflight, green; a sweep that two browsers
-// watch to its end, one of them on a phone, the other loaded anew in the middle; a pause. Then the capture is verified,
-// downloaded and deleted.
+// watch to its end, one of them on a phone, the other loaded anew in the middle; a pause; the light field so far, and a
+// camera live. Then the capture is verified, downloaded and deleted.
 import { createHash } from "node:crypto";
 import { readFileSync, statSync } from "node:fs";
 import { join } from "node:path";
@@ -27,6 +27,36 @@ async function badPlan(bench) {
     await usePlan(page, bench.plan());
     check(await page.at("start").isDisabled(), "start can be pressed before the preflight");
     check((await page.at("start-why").innerText()).length > 10, "why start cannot be pressed is not said");
+}
+
+const picturesOf = async (page) => Number(await page.at("field-view").getAttribute("data-pictures"));
+
+// The light field, of what there is of it just then, follows a finger.
+async function lookInside(bench, page, name) {
+    await goTo(page, "preview");
+    const field = page.at("field-view");
+    await until("a view of the light field is there", async () =>
+        await field.getAttribute("data-state") === "there" && Number(await field.getAttribute("data-frames")) > 0);
+    const before = await picturesOf(page), box = await field.locator("canvas, img").first().boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width / 4, box.y + box.height / 2, { steps: 4 });
+    await page.mouse.up();
+    await until("another view has come", async () => await picturesOf(page) > before);
+    await bench.picture(page, name);
+}
+
+async function watchCamera(bench, page) {
+    const live = page.at("live").first();
+
+    await goTo(page, "preview");
+    await live.waitFor();
+    if (await live.getAttribute("data-live") === "off") // the first moves by itself where there is room for it
+        await live.locator('[data-test="live-toggle"]').click();
+    await until("a camera's picture moves", () => live.locator("img").evaluateAll((all) =>
+        all.some((img) => img.src.includes("/live") && img.naturalWidth > 0)));
+    await bench.picture(page, "camera-live");
+    await live.locator('[data-test="live-toggle"]').click();
 }
 
 async function reload(page) {
@@ -57,6 +87,8 @@ async function sweep(bench) {
     check((await sphere(page)).mode === "webgl", "the sphere is not drawn by WebGL");
     check((await sphere(page)).good < FRAMES, "it was paused too late to show anything");
     await bench.picture(page, "paused");
+    await lookInside(bench, page, "light-field-so-far");
+    await goTo(page, "sweep");
     await reload(page);
     await seesState(page, "paused");
 
@@ -74,6 +106,8 @@ async function sweep(bench) {
         });
     }
     await bench.picture(page, "sweep-done");
+    await lookInside(bench, page, "light-field-whole");
+    await watchCamera(bench, page);
 }
 
 async function captures(bench) {

@@ -56,6 +56,13 @@ expect_line 3 "nothing: opening it" "$lumi" user add anna --users "$users" --pas
 start
 expect_line 1 "there is no user yet: lumi user add NAME" "$lumi" pair
 
+# A file that says nothing clear lets nobody in, and is told before lumid is started.
+mkdir -p other
+sed "s|^access *=.*|access = $scratch/other|" lumid.conf >other.conf
+printf 'anna:root:x\n' >other/users
+chmod 600 other/users
+expect_line 3 "other/users" "$lumid" --config other.conf --check
+
 # ---- the first user ----
 
 expect 0 "the first user" "$lumi" user add anna --users "$users" --password-file password

@@ -13,8 +13,6 @@ drawing() { # the program's number: lumid has no other child
 }
 
 if [ "${4:-}" = operate ]; then
-    PATH="$(dirname "$lumi"):$PATH"
-    export PATH
     start_daemon 8487
     start_capture
     # An arc has four frames.

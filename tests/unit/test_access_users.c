@@ -174,6 +174,26 @@ static void each_address_waits_twice_as_long_each_time(void **state)
     lumi_attempts_destroy(attempts);
 }
 
+static void a_name_of_ones_own_helps_nobody_to_guess_anothers(void **state)
+{
+    struct lumi_attempts *attempts = lumi_attempts_create();
+    int64_t now = 0, wait;
+    int guesses = 0;
+
+    (void)state;
+    for (int try = 0; try < 400; try++) { /* one's own, and a guess, as fast as may be */
+        bool guess = try % 2;
+        while ((wait = lumi_attempts_ask(attempts, now, "\1\2\3\4", 4, false)) > 0)
+            now += wait;
+        guesses += guess;
+        if (!guess)
+            lumi_attempts_good(attempts, now, "\1\2\3\4", 4, false);
+    }
+    assert_int_equal(guesses, 200);
+    assert_true(now > 180 * 900 * SECOND); /* but for the first each has waited its quarter of an hour */
+    lumi_attempts_destroy(attempts);
+}
+
 static void strangers_lock_nobody_out_who_was_in_or_sits_here(void **state)
 {
     struct lumi_attempts *attempts = lumi_attempts_create();
@@ -231,6 +251,7 @@ int main(void)
         cmocka_unit_test(a_password_is_known_by_its_hash),
         cmocka_unit_test(a_code_is_good_once_and_for_five_minutes),
         cmocka_unit_test(each_address_waits_twice_as_long_each_time),
+        cmocka_unit_test(a_name_of_ones_own_helps_nobody_to_guess_anothers),
         cmocka_unit_test(strangers_lock_nobody_out_who_was_in_or_sits_here),
         cmocka_unit_test(a_square_has_its_margin),
     };
