@@ -8,7 +8,7 @@ build=$(realpath "$1")
 test=$(realpath "$(dirname "$0")/../scenario/idle_streams_test.sh")
 work_folder "${2:-}"
 machine
-for first in "" yes; do
+for first in no yes; do
     (cd "$dir" && LUMI_STREAMS_FIRST=$first "$test" "$build/cli/lumi" "$build/daemon/lumid/lumid" \
         "$build/tests/scenario/hold_streams") >"$dir/said" || {
         status=$?

@@ -26,6 +26,7 @@ if(TARGET lumid)
   add_test(NAME idle_streams_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/idle_streams_test.sh $<TARGET_FILE:lumi>
     $<TARGET_FILE:lumid> $<TARGET_FILE:hold_streams>)
   set_tests_properties(idle_streams_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS slow)
+  lumi_first(idle_streams_test sim_rig_test sim_rig_faults_test rig_pictures_test)
   # The daemon killed in the middle of its work; a hundred times only in `script/test all`.
   add_executable(capture_kept capture_kept.c)
   target_link_libraries(capture_kept PRIVATE lumi_flags lumi_capture lumi_base)

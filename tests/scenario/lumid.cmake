@@ -7,4 +7,3 @@ add_test(NAME lumid_files_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/lumid_files_t
 set_tests_properties(lumid_files_test PROPERTIES TIMEOUT 600)
 add_test(NAME access_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/access_test.sh $<TARGET_FILE:lumid> $<TARGET_FILE:lumi>)
 set_tests_properties(access_test PROPERTIES TIMEOUT 300)
-lumi_sanitized(access_test)

@@ -8,5 +8,6 @@ if(TARGET lumid)
   target_link_libraries(ask_view PRIVATE lumi_flags lumi_image lumi_base PkgConfig::libsoup_3_0 PkgConfig::json_glib_1_0)
   add_test(NAME rig_field_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/rig_field_test.sh $<TARGET_FILE:lumi>
     $<TARGET_FILE:lumid> $<TARGET_FILE:ask_view>)
-  set_tests_properties(rig_field_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
+  set_tests_properties(rig_field_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS slow)
+  lumi_first(rig_field_test)
 endif()

@@ -191,7 +191,8 @@ static void the_cookie_is_for_this_site_and_no_script(void **state)
 
     assert_non_null(strstr(cookie, "; Path=/; Max-Age=1209600; HttpOnly; SameSite=Strict"));
     assert_null(strstr(cookie, "Domain"));
-    assert_null(strstr(answer.body, between(cookie, "lumid=", ";")));
+    g_autofree char *secret = between(cookie, "lumid=", ";");
+    assert_null(strstr(answer.body, secret));
     answer_clear(&answer);
 }
 
