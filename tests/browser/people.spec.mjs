@@ -124,7 +124,8 @@ async function pairing(bench) {
     await until("the desk sees the phone", async () =>
         await desk.at("people").locator("li, tr").count() >= 2);
     await control(phone, "jog");
-    check((await phone.at("dialog-people").innerText()).includes("anna"), "who else is connected is not said");
+    await until("who else is connected is said", async () =>
+        (await phone.at("dialog-people").innerText()).includes("anna"));
     await phone.at("dialog-cancel").click();
 }
 
