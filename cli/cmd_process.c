@@ -113,8 +113,8 @@ const struct cli_command cli_process = {
     .name = "process",
     .arguments = "CAPTURE -o FILE.lumi",
     .summary = "make a light field from a capture",
-    .description = "Runs every stage of the pipeline over the capture's images: equiangular views, depth, geometry, "
-                   "compression. What the stages make is kept beside the capture (in CAPTURE.work): a run that was "
+    .description = "Runs every stage of the pipeline that the capture wants ('lumi stage' lists them). What the stages "
+                   "make is kept beside the capture (in CAPTURE.work): a run that was "
                    "stopped goes on where it stopped, and a stage whose input and parameters have not changed is "
                    "skipped. The file appears when it is whole.",
     .options = options,

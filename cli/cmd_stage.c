@@ -37,10 +37,13 @@ static int run_stage(int argc, char **argv, struct lumi_error *error)
     LUMI_TRY(process_options_read(&parameters, error));
     LUMI_TRY(lumi_graph_open(argv[1], process_options.work, &parameters, process_options.threads, false, &run, error));
     run->progress = cli_progress;
-    code = lumi_run_stage(run, stage, range ? ends[0] : 0, range ? ends[1] : run->count, &skipped, error);
+    code = lumi_graph_prepare(run, stage, error);
+    const int all = code == LUMI_OK ? lumi_stage_count(run, stage) : 0;
+    if (code == LUMI_OK)
+        code = lumi_run_stage(run, stage, range ? ends[0] : 0, range ? ends[1] : -1, &skipped, error);
     if (code == LUMI_OK) {
         cli_progress_end();
-        int outputs = stage->whole ? 1 : range ? ends[1] - ends[0] : run->count;
+        int outputs = stage->whole || all == 0 || !range ? all : ends[1] - ends[0];
         printf("%s: %d made, %d there\n", stage->name, outputs - skipped, skipped);
     }
     lumi_run_close(run);

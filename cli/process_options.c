@@ -3,6 +3,8 @@
 
 #include "proto/base/geometry.h"
 
+#include <string.h>
+
 #define NOT_GIVEN (-1000000)
 
 struct process_options process_options = {.pixels_per_degree = NOT_GIVEN,
@@ -40,6 +42,35 @@ static int read_names(struct lumi_parameters *parameters, struct lumi_error *err
     if (process_options.kernel) {
         LUMI_TRY(cli_parse_choice("--kernel", process_options.kernel, kernels, &choice, error));
         parameters->kernel = (enum lumi_disk_kernel)choice;
+    }
+    return LUMI_OK;
+}
+
+static int read_choice(const char *option, const char *given, enum lumi_choice *choice, struct lumi_error *error)
+{
+    static const char *const names[] = {"auto", "no", "yes", NULL};
+    int index;
+
+    if (!given)
+        return LUMI_OK;
+    LUMI_TRY(cli_parse_choice(option, given, names, &index, error));
+    *choice = (enum lumi_choice)index;
+    return LUMI_OK;
+}
+
+static int read_stages(struct lumi_parameters *parameters, struct lumi_error *error)
+{
+    const struct process_options *o = &process_options;
+
+    LUMI_TRY(read_choice("--calibrate", o->calibrate, &parameters->calibrate, error));
+    LUMI_TRY(read_choice("--equalize", o->equalize, &parameters->equalize, error));
+    LUMI_TRY(read_choice("--synthesize", o->synthesize, &parameters->synthesize, error));
+    LUMI_TRY(read_choice("--subsample", o->subsample, &parameters->subsample, error));
+    if (o->prefilter && strcmp(o->prefilter, "auto") != 0) {
+        LUMI_TRY(cli_parse_ints("--prefilter", o->prefilter, ',', 1, &parameters->prefilter, error));
+        LUMI_TRY(check_range("--prefilter", parameters->prefilter, 0, 65536, error));
+    } else if (o->prefilter) {
+        parameters->prefilter = -1;
     }
     return LUMI_OK;
 }
@@ -89,6 +120,7 @@ int process_options_read(struct lumi_parameters *parameters, struct lumi_error *
     lumi_run_defaults(parameters);
     LUMI_TRY(cli_check_threads(o->threads, error));
     LUMI_TRY(read_names(parameters, error));
+    LUMI_TRY(read_stages(parameters, error));
     LUMI_TRY(read_numbers(parameters, error));
     if (o->quality != NOT_GIVEN) {
         LUMI_TRY(check_range("--quality", o->quality, 0, 100, error));

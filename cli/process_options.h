@@ -8,6 +8,7 @@
 /* Values that the option tables of both commands write to. */
 struct process_options {
     char *work, *projection, *fov, *shape, *kernel;
+    char *calibrate, *equalize, *synthesize, *subsample, *prefilter; /* which stages there are */
     double pixels_per_degree, near_m, far_m, gp, disk_scale;
     int neighbours, quality, cluster, threads;
     gint64 target_bytes;
@@ -18,6 +19,11 @@ extern struct process_options process_options;
 #define PROCESS_OPTIONS                                                                                                \
     {"work", 'w', 0, G_OPTION_ARG_FILENAME, &process_options.work, "where the stages keep their files (CAPTURE.work)", "DIR"}, \
     {"threads", 'j', 0, G_OPTION_ARG_INT, &process_options.threads, "threads (all)", "N"},                              \
+    {"calibrate", 0, 0, G_OPTION_ARG_STRING, &process_options.calibrate, "find the cameras' poses in the pictures: auto, no, yes", "WHETHER"}, \
+    {"equalize", 0, 0, G_OPTION_ARG_STRING, &process_options.equalize, "even out exposure and vignetting between cameras: auto, no, yes", "WHETHER"}, \
+    {"synthesize", 0, 0, G_OPTION_ARG_STRING, &process_options.synthesize, "views for the poles, and the stand filled in: auto, no, yes", "WHETHER"}, \
+    {"subsample", 0, 0, G_OPTION_ARG_STRING, &process_options.subsample, "thin out views where they are dense: auto, no, yes", "WHETHER"}, \
+    {"prefilter", 0, 0, G_OPTION_ARG_STRING, &process_options.prefilter, "samples a pixel of the prefilter, auto, or 0 for none", "N"}, \
     {"projection", 0, 0, G_OPTION_ARG_STRING, &process_options.projection, "auto, equiangular or rectilinear views (auto)", "NAME"}, \
     {"fov", 0, 0, G_OPTION_ARG_STRING, &process_options.fov, "field of view of the views, degrees (from the lens)", "XxY"}, \
     {"pixels-per-degree", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.pixels_per_degree, "density of the views (from the lens)", "N"}, \

@@ -24,11 +24,12 @@ static void key_content(struct lumi_run *run, struct lumi_key *k)
     lumi_key_int(k, parameters->disk_shape);
     lumi_key_int(k, parameters->kernel);
     lumi_key_double(k, parameters->disk_scale);
-    for (int i = 0; i < run->count; i++) {
+    for (int n = 0; n < run->kept_count; n++) {
+        const int i = run->kept[n];
         lumi_key_bytes(k, run->sources[i].name, sizeof run->sources[i].name);
         lumi_key_bytes(k, &run->sources[i].pose, sizeof run->sources[i].pose);
-        lumi_key_input(k, run, "equiangular", i);
-        lumi_key_input(k, run, "depth", i);
+        lumi_key_view(k, run, i, LUMI_VIEW_FINAL);
+        lumi_key_view(k, run, i, LUMI_VIEW_DEPTH);
         lumi_key_input(k, run, "geometry", i);
         lumi_key_input(k, run, "geometry-coarse", i);
     }
@@ -240,7 +241,7 @@ static int estimate(void *context, int quality, long long *size, struct lumi_err
 
 static int write_within(struct lumi_run *run, long long target, const char *path, struct lumi_error *error)
 {
-    bool sample = compress_sample_pays(run->count, run->parameters.cluster_size);
+    bool sample = compress_sample_pays(run->kept_count, run->parameters.cluster_size);
     struct search search = {run, path, -1};
     long long size = 0;
     int quality;
@@ -271,6 +272,7 @@ const struct lumi_stage lumi_stage_compress = {
     .version = 2,
     .extension = ".lumi",
     .whole = true,
+    .set = LUMI_SET_KEPT,
     .serial = true,
     .key = key,
     .make = make,

@@ -37,13 +37,15 @@ int compress_level_init(struct compress_level *level, struct lumi_run *run, int 
     *level = (struct compress_level){.run = run, .index = index, .grid = run->grid};
     compress_quality_init(&level->quality, quality);
 
-    struct lumi_pose *poses = lumi_alloc((size_t)run->count, sizeof *poses);
+    struct lumi_pose *poses = lumi_alloc((size_t)run->kept_count, sizeof *poses);
     if (!poses)
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for the views of a level");
-    for (int i = 0; i < run->count; i++)
-        poses[i] = run->sources[i].pose;
+    for (int i = 0; i < run->kept_count; i++)
+        poses[i] = run->sources[run->kept[i]].pose;
     if (index == LUMI_LEVEL_COARSE) {
-        int code = lumi_coarse_views(run->count, poses, &level->sources, &level->count, error);
+        int code = lumi_coarse_views(run->kept_count, poses, &level->sources, &level->count, error);
+        for (int i = 0; code == LUMI_OK && i < level->count; i++)
+            level->sources[i] = run->kept[level->sources[i]];
         lumi_free(poses);
         LUMI_TRY(code);
         if (!lumi_grid_init_half(&level->grid, &run->grid))
@@ -51,10 +53,10 @@ int compress_level_init(struct compress_level *level, struct lumi_run *run, int 
         LUMI_TRY(lumi_warp_create_half(&run->grid, &level->grid, &level->half, error));
         poses = lumi_alloc((size_t)level->count, sizeof *poses);
     } else {
-        level->count = run->count;
-        level->sources = lumi_alloc((size_t)run->count, sizeof *level->sources);
-        for (int i = 0; level->sources && i < run->count; i++)
-            level->sources[i] = i;
+        level->count = run->kept_count;
+        level->sources = lumi_alloc((size_t)run->kept_count, sizeof *level->sources);
+        for (int i = 0; level->sources && i < run->kept_count; i++)
+            level->sources[i] = run->kept[i];
     }
     level->poses = poses;
     if (!poses || !level->sources)
@@ -145,8 +147,8 @@ static int nearest_views(const struct compress_level *level, int cluster, int ne
 static void key_view(const struct compress_level *level, int view, struct lumi_key *key)
 {
     lumi_key_bytes(key, &level->poses[view], sizeof *level->poses);
-    lumi_key_input(key, level->run, "equiangular", level->sources[view]);
-    lumi_key_input(key, level->run, "depth", level->sources[view]);
+    lumi_key_view(key, level->run, level->sources[view], LUMI_VIEW_FINAL);
+    lumi_key_view(key, level->run, level->sources[view], LUMI_VIEW_DEPTH);
 }
 
 static void run_key(const struct compress_level *level, int run, char hex[LUMI_KEY_HEX])

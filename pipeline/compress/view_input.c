@@ -19,7 +19,7 @@ static int check_size(const struct lumi_raster *raster, const struct lumi_grid *
 
 int compress_view_image(const struct compress_level *level, int view, struct lumi_yuv *image, struct lumi_error *error)
 {
-    g_autofree char *path = lumi_run_path(level->run, "equiangular", level->sources[view], ".exr");
+    g_autofree char *path = lumi_run_view(level->run, level->sources[view], LUMI_VIEW_FINAL);
     struct lumi_raster raster = {0}, half = {0};
     const struct lumi_raster *from = &raster;
     int code;
@@ -92,7 +92,7 @@ static struct lumi_shift tile_shift(const struct compress_level *level, const st
 int compress_view_seeds(const struct compress_level *level, int view, int reference, struct lumi_shift **seeds,
                         struct lumi_error *error)
 {
-    g_autofree char *path = lumi_run_path(level->run, "depth", level->sources[view], ".exr");
+    g_autofree char *path = lumi_run_view(level->run, level->sources[view], LUMI_VIEW_DEPTH);
     const int cols = level->grid.cols, rows = level->grid.rows;
     struct lumi_raster depth = {0};
     int code;

@@ -26,7 +26,7 @@ struct depth_state {
 static int neighbours_of(const struct lumi_run *run, const struct lumi_pose *poses, int index,
                          int neighbours[LUMI_MVS_NEIGHBOURS])
 {
-    return lumi_mvs_neighbours(run->count, poses, index, run->parameters.depth_neighbours, neighbours);
+    return lumi_mvs_neighbours(run->dense, poses, index, run->parameters.depth_neighbours, neighbours);
 }
 
 static struct lumi_pose *all_poses(const struct lumi_run *run)
@@ -48,15 +48,6 @@ static void key_grid(struct lumi_key *key, const struct lumi_grid *grid)
         lumi_key_double(key, grid->tan_y[i]);
 }
 
-static void key_pose(struct lumi_key *key, const struct lumi_pose *pose)
-{
-    for (int i = 0; i < 9; i++)
-        lumi_key_double(key, pose->r[i]);
-    lumi_key_double(key, pose->t.x);
-    lumi_key_double(key, pose->t.y);
-    lumi_key_double(key, pose->t.z);
-}
-
 /* The view and its neighbours: their poses and their files from `stages`. */
 static void key_views(struct lumi_run *run, int index, const char *const *stages, struct lumi_key *key)
 {
@@ -66,7 +57,7 @@ static void key_views(struct lumi_run *run, int index, const char *const *stages
 
     lumi_key_int(key, count);
     for (int i = 0; i < count; i++) {
-        key_pose(key, &poses[views[i]]);
+        lumi_key_pose(key, &poses[views[i]]);
         for (int s = 0; stages[s]; s++)
             lumi_key_input(key, run, stages[s], views[i]);
     }
@@ -233,6 +224,7 @@ const struct lumi_stage lumi_stage_match = {
     .title = "matching",
     .version = 3,
     .extension = ".exr",
+    .set = LUMI_SET_DENSE,
     .key = match_key,
     .begin = match_begin,
     .end = end,
@@ -245,6 +237,7 @@ const struct lumi_stage lumi_stage_depth = {
     .title = "depth",
     .version = 2,
     .extension = ".exr",
+    .set = LUMI_SET_DENSE,
     .key = depth_key,
     .begin = depth_begin,
     .end = end,

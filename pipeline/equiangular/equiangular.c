@@ -6,6 +6,7 @@
 #include "proto/base/parallel.h"
 #include "proto/image/image.h"
 
+#include <glib.h>
 #include <string.h>
 
 /* Lenses whose warps are kept from image to image (10 bytes a pixel and lens); captures with a lens of its own for
@@ -18,27 +19,11 @@ struct state {
     struct lumi_warp *warps[KEPT_WARPS];
 };
 
-static bool same(const struct lumi_lens *a, const struct lumi_lens *b)
-{
-    return a->model == b->model && a->width == b->width && a->height == b->height && a->fx == b->fx && a->fy == b->fy &&
-           a->cx == b->cx && a->cy == b->cy && a->k1 == b->k1 && a->k2 == b->k2 && a->k3 == b->k3 && a->k4 == b->k4 &&
-           a->p1 == b->p1 && a->p2 == b->p2;
-}
-
 static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
 {
-    const struct lumi_source *source = &run->sources[index];
-    const struct lumi_lens *lens = &source->lens;
-    const double numbers[] = {lens->fx, lens->fy, lens->cx, lens->cy, lens->k1,
-                              lens->k2, lens->k3, lens->k4, lens->p1, lens->p2};
-
     (void)error;
-    lumi_key_bytes(k, source->sha256, strlen(source->sha256));
-    lumi_key_int(k, lens->model);
-    lumi_key_int(k, lens->width);
-    lumi_key_int(k, lens->height);
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        lumi_key_double(k, numbers[i]);
+    lumi_key_image(k, run, index);
+    lumi_key_lens(k, &run->sources[index].lens);
     lumi_key_int(k, run->grid.width);
     lumi_key_int(k, run->grid.height);
     for (int i = 0; i <= run->grid.cols; i++)
@@ -88,7 +73,7 @@ static int begin(struct lumi_run *run, void **pointer, struct lumi_error *error)
     for (int i = 0; i < run->count && state->count < KEPT_WARPS; i++) {
         const struct lumi_lens *lens = &run->sources[i].lens;
         int k = 0;
-        while (k < state->count && !same(&state->lenses[k], lens))
+        while (k < state->count && !lumi_lens_equal(&state->lenses[k], lens))
             k++;
         if (k == state->count && !lumi_warp_is_copy(lens, &run->grid))
             state->lenses[state->count++] = *lens;
@@ -109,21 +94,23 @@ done:
 }
 
 /* The frame as 3-channel linear floats. */
-static int read_linear(const struct lumi_source *source, struct lumi_raster *linear, struct lumi_error *error)
+static int read_linear(const struct lumi_run *run, int index, struct lumi_raster *linear, struct lumi_error *error)
 {
+    const struct lumi_source *source = &run->sources[index];
+    g_autofree char *path = lumi_run_image(run, index);
     struct lumi_raster raster;
 
     *linear = (struct lumi_raster){0};
-    LUMI_TRY(lumi_image_read(source->path, 3, &raster, NULL, error));
+    LUMI_TRY(lumi_image_read(path, 3, &raster, NULL, error));
     int result = LUMI_OK;
     if (raster.width != source->lens.width || raster.height != source->lens.height) {
-        result = lumi_fail(error, LUMI_ERR_FORMAT, "%s: the image is %d × %d, its camera %d × %d", source->path,
-                           raster.width, raster.height, source->lens.width, source->lens.height);
+        result = lumi_fail(error, LUMI_ERR_FORMAT, "%s: the image is %d × %d, its camera %d × %d", path, raster.width,
+                           raster.height, source->lens.width, source->lens.height);
     } else if (raster.sample == LUMI_F32) {
         *linear = raster;
         raster = (struct lumi_raster){0};
     } else if (lumi_raster_convert(&raster, LUMI_F32, linear) != LUMI_OK) {
-        result = lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", source->path);
+        result = lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", path);
     }
     lumi_raster_finish(&raster);
     return result;
@@ -137,7 +124,7 @@ static int resample(const struct lumi_run *run, const struct state *state, const
     struct lumi_raster view;
 
     for (int i = 0; i < state->count && !warp; i++)
-        if (same(&state->lenses[i], &source->lens))
+        if (lumi_lens_equal(&state->lenses[i], &source->lens))
             warp = state->warps[i];
     if (!warp) {
         LUMI_TRY(lumi_warp_create(&source->lens, &run->grid, &own, error));
@@ -159,7 +146,7 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
     struct lumi_raster image;
 
     (void)thread;
-    LUMI_TRY(read_linear(source, &image, error));
+    LUMI_TRY(read_linear(run, index, &image, error));
     int result = LUMI_OK;
     if (!lumi_warp_is_copy(&source->lens, &run->grid)) {
         result = resample(run, state, source, &image, error);
@@ -181,6 +168,7 @@ const struct lumi_stage lumi_stage_equiangular = {
     .title = "equiangular",
     .version = 1,
     .extension = ".exr",
+    .set = LUMI_SET_DENSE,
     .key = key,
     .begin = begin,
     .end = end,

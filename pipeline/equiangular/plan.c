@@ -172,7 +172,7 @@ int lumi_equiangular_plan(struct lumi_run *run, struct lumi_error *error)
 
     if (!lenses)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", run->capture);
-    for (int i = 0; i < run->count; i++) {
+    for (int i = 0; i < run->dense; i++) {
         int k = count - 1;
         while (k >= 0 && !lumi_lens_equal(&lenses[k], &run->sources[i].lens))
             k--;

@@ -103,15 +103,27 @@ static int export_field(const struct lumi_export_view *export, struct lumi_error
 
 /* From a work directory */
 
+static int look_for(const char *path, const struct lumi_run *run, const char *stage, int view, struct lumi_error *error)
+{
+    if (g_file_test(path, G_FILE_TEST_EXISTS))
+        return LUMI_OK;
+    return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: is not there: stage '%s' has not been run for view '%s'", path,
+                     stage, run->sources[view].name);
+}
+
 /* The file a stage made for a view, or a line that says that it has not. */
 static int stage_file(const struct lumi_run *run, const char *stage, int view, const char *extension, char **path,
                       struct lumi_error *error)
 {
     *path = lumi_run_path(run, stage, view, extension);
-    if (g_file_test(*path, G_FILE_TEST_EXISTS))
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: is not there: stage '%s' has not been run for view '%s'", *path,
-                     stage, run->sources[view].name);
+    return look_for(*path, run, stage, view, error);
+}
+
+static int view_file(const struct lumi_run *run, enum lumi_view_part part, const char *stage, int view, char **path,
+                     struct lumi_error *error)
+{
+    *path = lumi_run_view(run, view, part);
+    return look_for(*path, run, stage, view, error);
 }
 
 static int export_work_depth(const struct lumi_export_view *export, const struct lumi_run *run, int view,
@@ -120,7 +132,7 @@ static int export_work_depth(const struct lumi_export_view *export, const struct
     g_autofree char *path = NULL;
     struct lumi_raster depth = {0};
 
-    LUMI_TRY(stage_file(run, "depth", view, ".exr", &path, error));
+    LUMI_TRY(view_file(run, LUMI_VIEW_DEPTH, "depth", view, &path, error));
     int code = lumi_image_read_channel(path, "W", &depth, error);
     if (code == LUMI_OK)
         code = lumi_export_depth(export->depth, &depth, error);
@@ -153,7 +165,7 @@ static int export_work_mesh(const struct lumi_export_view *export, struct lumi_r
     int code;
 
     LUMI_TRY(stage_file(run, "geometry", view, ".mesh", &mesh_path, error));
-    LUMI_TRY(stage_file(run, "equiangular", view, ".exr", &image_path, error));
+    LUMI_TRY(view_file(run, LUMI_VIEW_PICTURE, "equiangular", view, &image_path, error));
     LUMI_TRY(lumi_equiangular_plan(run, error));
     LUMI_TRY(lumi_image_read(image_path, 3, &linear, NULL, error));
     if (linear.width != run->grid.width || linear.height != run->grid.height)
@@ -184,11 +196,12 @@ static int export_work(const struct lumi_export_view *export, struct lumi_error 
         return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: is not there: the capture has not been processed", work);
     lumi_run_defaults(&parameters);
     LUMI_TRY(lumi_run_open(export->source, work, &parameters, 0, false, &run, error));
-    for (int i = 0; i < run->count && view < 0; i++)
+    code = lumi_run_place(run, error);
+    for (int i = 0; code == LUMI_OK && i < run->count && view < 0; i++)
         if (!strcmp(run->sources[i].name, export->view))
             view = i;
     view = view >= 0 ? view : number_of(export->view, run->count);
-    if (view < 0)
+    if (code == LUMI_OK && view < 0)
         code = lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: has no view '%s'", export->source, export->view);
     if (code == LUMI_OK && export->depth)
         code = export_work_depth(export, run, view, error);

@@ -20,7 +20,8 @@ double lumi_geometry_disparity(const struct lumi_run *run, int index)
     double nearest[NEIGHBOURS + 1], sum = 0;
     int count = 0;
 
-    for (int i = 0; i < run->count; i++) {
+    for (int n = 0; n < run->kept_count; n++) {
+        const int i = run->kept[n];
         const double d = lumi_length(lumi_sub(run->sources[i].pose.t, run->sources[index].pose.t));
         if (i == index || !(d > 0))
             continue;
@@ -40,8 +41,8 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
     (void)error;
     lumi_key_double(k, run->parameters.geometry_precision);
     lumi_key_double(k, lumi_geometry_disparity(run, index));
-    lumi_key_input(k, run, "equiangular", index);
-    lumi_key_input(k, run, "depth", index);
+    lumi_key_view(k, run, index, LUMI_VIEW_PICTURE);
+    lumi_key_view(k, run, index, LUMI_VIEW_DEPTH);
     return LUMI_OK;
 }
 
@@ -67,8 +68,8 @@ static void input_finish(struct input *input)
 
 static int read_input(const struct lumi_run *run, int index, struct input *input, struct lumi_error *error)
 {
-    g_autofree char *colour = lumi_run_path(run, "equiangular", index, ".exr");
-    g_autofree char *depth = lumi_run_path(run, "depth", index, ".exr");
+    g_autofree char *colour = lumi_run_view(run, index, LUMI_VIEW_PICTURE);
+    g_autofree char *depth = lumi_run_view(run, index, LUMI_VIEW_DEPTH);
 
     *input = (struct input){0};
     LUMI_TRY(lumi_image_read(colour, 3, &input->colour, NULL, error));
@@ -165,6 +166,7 @@ const struct lumi_stage lumi_stage_geometry = {
     .title = "geometry",
     .version = 2,
     .extension = ".mesh",
+    .set = LUMI_SET_KEPT,
     .key = key,
     .make = make,
 };
@@ -174,6 +176,7 @@ const struct lumi_stage lumi_stage_geometry_coarse = {
     .title = "coarse geometry",
     .version = 2,
     .extension = ".mesh",
+    .set = LUMI_SET_KEPT,
     .key = key,
     .begin = coarse_begin,
     .end = coarse_end,

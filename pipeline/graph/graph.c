@@ -31,24 +31,48 @@ const struct lumi_stage *lumi_stage_by_name(const char *name)
     return NULL;
 }
 
+static bool first_phase_wanted(const struct lumi_run *run)
+{
+    for (int i = 0; lumi_stages[i]; i++)
+        if (lumi_stages[i]->set == LUMI_SET_FRAMES && lumi_stage_count(run, lumi_stages[i]) > 0)
+            return true;
+    return false;
+}
+
+int lumi_graph_place(struct lumi_run *run, struct lumi_error *error)
+{
+    if (run->placed)
+        return LUMI_OK;
+    LUMI_TRY(lumi_run_place(run, error));
+    LUMI_TRY(lumi_equiangular_plan(run, error));
+    g_autofree struct lumi_pose *poses = g_new(struct lumi_pose, (gsize)run->dense);
+    for (int i = 0; i < run->dense; i++)
+        poses[i] = run->sources[i].pose;
+    lumi_surface_fit(run->dense, poses, &run->surface, &run->centre, &run->radius);
+    return LUMI_OK;
+}
+
 int lumi_graph_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
                     bool alone, struct lumi_run **result, struct lumi_error *error)
 {
     struct lumi_run *run;
+    int code = LUMI_OK;
 
     *result = NULL;
     LUMI_TRY(lumi_run_open(capture, work, parameters, threads, alone, &run, error));
-    int code = lumi_equiangular_plan(run, error);
+    if (!first_phase_wanted(run))
+        code = lumi_graph_place(run, error);
     if (code != LUMI_OK) {
         lumi_run_close(run);
         return code;
     }
-    g_autofree struct lumi_pose *poses = g_new(struct lumi_pose, (gsize)run->count);
-    for (int i = 0; i < run->count; i++)
-        poses[i] = run->sources[i].pose;
-    lumi_surface_fit(run->count, poses, &run->surface, &run->centre, &run->radius);
     *result = run;
     return LUMI_OK;
+}
+
+int lumi_graph_prepare(struct lumi_run *run, const struct lumi_stage *stage, struct lumi_error *error)
+{
+    return stage->set == LUMI_SET_FRAMES ? LUMI_OK : lumi_graph_place(run, error);
 }
 
 int lumi_graph_process(struct lumi_run *run, const char *output, lumi_graph_report report, struct lumi_error *error)
@@ -60,11 +84,15 @@ int lumi_graph_process(struct lumi_run *run, const char *output, lumi_graph_repo
     for (int i = 0; lumi_stages[i]; i++) {
         int skipped = 0;
         last = lumi_stages[i];
+        LUMI_TRY(lumi_graph_prepare(run, last, error));
+        const int outputs = lumi_stage_count(run, last);
+        if (outputs == 0)
+            continue;
         if (report)
             report(last, false, 0, 0);
-        LUMI_TRY(lumi_run_stage(run, last, 0, run->count, &skipped, error));
+        LUMI_TRY(lumi_run_stage(run, last, 0, -1, &skipped, error));
         if (report)
-            report(last, true, last->whole ? 1 : run->count, skipped);
+            report(last, true, outputs, skipped);
     }
     g_autofree char *made = lumi_run_path(run, last->name, -1, last->extension);
     return lumi_deliver(made, output, error);

@@ -16,12 +16,17 @@
 struct lumi_run_private {
     int lock;              /* the work directory's lock file */
     pthread_mutex_t mutex; /* guards keys */
-    GHashTable *keys;      /* "stage/index" → hex key */
+    GHashTable *keys;      /* "stage/name" → hex key */
 };
 
 void lumi_run_defaults(struct lumi_parameters *parameters)
 {
-    *parameters = (struct lumi_parameters){.geometry_precision = 5,
+    *parameters = (struct lumi_parameters){.calibrate = LUMI_CHOICE_NO,
+                                           .equalize = LUMI_CHOICE_NO,
+                                           .synthesize = LUMI_CHOICE_NO,
+                                           .subsample = LUMI_CHOICE_NO,
+                                           .prefilter = 0,
+                                           .geometry_precision = 5,
                                            .disk_scale = 1,
                                            .disk_shape = LUMI_DISK_OVAL,
                                            .kernel = LUMI_KERNEL_LINEAR,
@@ -34,18 +39,23 @@ char *lumi_run_path(const struct lumi_run *run, const char *stage, int index, co
     return g_strdup_printf("%s/%s/%s%s", run->work, stage, index < 0 ? "all" : run->sources[index].name, extension);
 }
 
+static char *key_name(const struct lumi_run *run, const char *stage, int index)
+{
+    return g_strdup_printf("%s/%s", stage, index < 0 ? "all" : run->sources[index].name);
+}
+
 void lumi_run_remember_key(const struct lumi_run *run, const char *stage, int index, const char *hex)
 {
     struct lumi_run_private *priv = run->priv;
 
     pthread_mutex_lock(&priv->mutex);
-    g_hash_table_replace(priv->keys, g_strdup_printf("%s/%d", stage, index), g_strdup(hex));
+    g_hash_table_replace(priv->keys, key_name(run, stage, index), g_strdup(hex));
     pthread_mutex_unlock(&priv->mutex);
 }
 
 bool lumi_run_output_key(const struct lumi_run *run, const char *stage, int index, char *hex)
 {
-    g_autofree char *name = g_strdup_printf("%s/%d", stage, index);
+    g_autofree char *name = key_name(run, stage, index);
 
     pthread_mutex_lock(&run->priv->mutex);
     const char *known = g_hash_table_lookup(run->priv->keys, name);
@@ -117,6 +127,25 @@ static char *strip_slashes(const char *path)
     return g_strndup(path, length);
 }
 
+static bool choose(enum lumi_choice choice, bool by_itself)
+{
+    return choice == LUMI_CHOICE_AUTO ? by_itself : choice == LUMI_CHOICE_YES;
+}
+
+static void resolve_wants(struct lumi_run *run)
+{
+    const struct lumi_parameters *p = &run->parameters;
+    bool priors = true;
+
+    for (int i = 0; i < run->count; i++)
+        priors = priors && run->sources[i].pose_source == LUMI_POSE_PRIOR;
+    run->wants.calibrate = choose(p->calibrate, priors);
+    run->wants.equalize = choose(p->equalize, run->wants.calibrate);
+    run->wants.synthesize = choose(p->synthesize, run->rig != NULL);
+    run->wants.subsample = choose(p->subsample, run->rig != NULL);
+    run->wants.prefilter = p->prefilter < 0 ? run->rig != NULL : p->prefilter > 0;
+}
+
 int lumi_run_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
                   bool alone, struct lumi_run **result, struct lumi_error *error)
 {
@@ -135,6 +164,9 @@ int lumi_run_open(const char *capture, const char *work, const struct lumi_param
     LUMI_GOTO(code, fail, lumi_sources_load(run, error));
     LUMI_GOTO(code, fail, lumi_file_check_output(run->work, run->capture, error));
     LUMI_GOTO(code, fail, lock_work(run, alone, error));
+    run->dense = run->count;
+    run_list_kept(run);
+    resolve_wants(run);
     *result = run;
     return LUMI_OK;
 fail:
@@ -147,8 +179,10 @@ void lumi_run_close(struct lumi_run *run)
     if (!run)
         return;
     for (int i = 0; i < run->count; i++)
-        g_free(run->sources[i].path);
+        sources_free(&run->sources[i]);
     g_free(run->sources);
+    g_free(run->kept);
+    g_free(run->rig);
     if (run->priv->lock >= 0)
         close(run->priv->lock);
     g_hash_table_destroy(run->priv->keys);

@@ -5,24 +5,40 @@
  * 1. A stage makes one file an image (some make one for all), written under a temporary name and renamed.
  * 2. Beside each output lies its key: SHA-256 over the stage's name, version and parameters and the keys of all inputs.
  *    An output whose key is as expected is not made again. The key is written after the output.
- * 3. What a stage writes depends on its inputs and parameters alone, not on threads, order, or time. */
+ * 3. What a stage writes depends on its inputs and parameters alone, not on threads, order, or time.
+ * 4. A run has two phases. First it holds the capture's frames as they were taken; calibration and the choice of views
+ *    end that with a list of places (places.h). lumi_run_place takes it up: from then on the run holds the views, real
+ *    ones first, synthetic ones after them. Indices mean other things then; names stay. */
 #ifndef LUMI_PIPELINE_RUN_RUN_H
 #define LUMI_PIPELINE_RUN_RUN_H
 
 #include "proto/base/lens.h"
 #include "proto/base/result.h"
+#include "proto/capture/capture.h"
 #include "proto/lightfield/disk.h"
 #include "proto/lightfield/field.h"
 #include "proto/lightfield/grid.h"
+#include "proto/mechanism/rig.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
+struct lumi_places;
+
 /* How source images become views. */
 enum lumi_projection { LUMI_PROJECTION_AUTO = 0, LUMI_PROJECTION_EQUIANGULAR = 1, LUMI_PROJECTION_RECTILINEAR = 2 };
 
+/* Whether something is done: auto leaves it to what the capture is. */
+enum lumi_choice { LUMI_CHOICE_AUTO = 0, LUMI_CHOICE_NO = 1, LUMI_CHOICE_YES = 2 };
+
 /* Parameters of all stages; lumi_run_defaults fills them. A stage's key covers only those it names. */
 struct lumi_parameters {
+    /* which stages there are */
+    enum lumi_choice calibrate;  /* auto: all poses are the rig's own idea of where it was */
+    enum lumi_choice equalize;   /* auto: where it is calibrated */
+    enum lumi_choice synthesize; /* auto: a rig that turns took it */
+    enum lumi_choice subsample;  /* auto: as synthesize */
+    int prefilter;               /* samples a pixel, 0: none; −1: auto, as synthesize, the stage's own number */
     /* equiangular */
     enum lumi_projection projection; /* auto: rectilinear pinholes under 75° keep their pixels, others equiangular */
     double fov_x, fov_y;             /* radians, 0: from the source */
@@ -41,20 +57,52 @@ struct lumi_parameters {
     int cluster_size;       /* images a reference */
 };
 
-/* One source image of the capture: a frame with its pose. In the order of the capture's positions. */
+/* One shot of a bracket. */
+struct lumi_source_part {
+    char *path, sha256[65]; /* path is owned */
+    double exposure_s, iso; /* as the camera reported them, 0: it did not */
+    double exposure_offset; /* stops, as asked for */
+};
+
+/* One image: a frame of the capture (or the frames of a bracket) with its pose, in the order of the capture's
+ * positions; once the run is placed also a view that nobody took. */
 struct lumi_source {
-    char name[64];   /* unique, safe as a file name, no extension */
-    char *path;      /* absolute path of the frame's file */
+    char name[64];   /* unique, safe as a file name, no extension; of a bracket: its middle shot's */
+    char *path;      /* absolute path of the frame's file; NULL: synthetic */
     char sha256[65]; /* of that file */
     struct lumi_lens lens;
     struct lumi_pose pose;
     int row, column; /* place in the sweep, −1 where there is none */
+    /* As the capture has it; all zero where it is synthetic. */
+    int camera;    /* number in the capture, −1: synthetic */
+    int lens_slot; /* equal for frames of one lens of the capture, from 0 */
+    char camera_name[64];
+    int position, turn;
+    double turn_angle, drop;
+    double exposure_s, iso, exposure_offset; /* as in struct lumi_source_part */
+    enum lumi_pose_source pose_source;
+    struct lumi_pose prior;         /* the capture's pose, whatever calibration says */
+    int part_count;                 /* of a bracket, 2 and more, darkest first as asked for; 0: none */
+    struct lumi_source_part *parts; /* owned */
+    /* Once the run is placed; until then kept is true, the others false. */
+    bool synthetic, masked, kept; /* as in struct lumi_place */
+};
+
+/* What is done, once parameters and capture are known. */
+struct lumi_wants {
+    bool calibrate, equalize, synthesize, subsample, prefilter, color;
 };
 
 struct lumi_run {
     char *capture, *work; /* directories; work lies beside the capture */
+    struct lumi_rig *rig; /* the capture's profile; NULL: none */
     struct lumi_source *sources;
     int count;
+    int dense; /* the first so many are photographs */
+    int *kept; /* indices of those that become views of the field, ascending */
+    int kept_count;
+    bool placed;
+    struct lumi_wants wants;
     struct lumi_grid grid;     /* the lens of every view, chosen by the equiangular stage's plan */
     enum lumi_surface surface; /* of the centres of projection */
     struct lumi_vec3 centre;
@@ -76,6 +124,14 @@ int lumi_run_open(const char *capture, const char *work, const struct lumi_param
                   bool alone, struct lumi_run **run, struct lumi_error *error);
 void lumi_run_close(struct lumi_run *run);
 
+/* What the stages that want places start from: the run's own frames, all used and kept; or what calibration made of
+ * them where it is wanted. Release with lumi_places_finish. LUMI_ERR_NOTFOUND: the stage has not been run. */
+int lumi_run_frames_places(const struct lumi_run *run, struct lumi_places *places, struct lumi_error *error);
+int lumi_run_calibrated_places(const struct lumi_run *run, struct lumi_places *places, struct lumi_error *error);
+/* Ends the first phase with what calibration and the choice of views left in the work directory, as far as they are
+ * wanted; nothing happens where the run is placed already. LUMI_ERR_NOTFOUND: one of them has not been run. */
+int lumi_run_place(struct lumi_run *run, struct lumi_error *error);
+
 /* "<work>/<stage>/<name><extension>"; free with g_free. index < 0: "<work>/<stage>/all<extension>". */
 char *lumi_run_path(const struct lumi_run *run, const char *stage, int index, const char *extension);
 
@@ -88,13 +144,39 @@ void lumi_key_double(struct lumi_key *key, double value);
  * that asks fails with a line that says which to run first. */
 void lumi_key_input(struct lumi_key *key, const struct lumi_run *run, const char *stage, int index);
 
+/* The key of a stage's output whatever it is called, and that of the places the run is at: poses, lenses, flags. */
+void lumi_key_lens(struct lumi_key *key, const struct lumi_lens *lens);
+void lumi_key_pose(struct lumi_key *key, const struct lumi_pose *pose);
+
+/* The picture of a frame: the file, or what the stage `merge` made of a bracket; free with g_free. And what stands for
+ * it in a key. */
+char *lumi_run_image(const struct lumi_run *run, int index);
+void lumi_key_image(struct lumi_key *key, const struct lumi_run *run, int index);
+
+/* A view, as it stands after some stages: picture (linear light), inverse depth (channel "W"), picture after the
+ * prefilter, picture in its final colours. What was not wanted is passed over. Free with g_free. */
+enum lumi_view_part { LUMI_VIEW_PICTURE, LUMI_VIEW_DEPTH, LUMI_VIEW_FILTERED, LUMI_VIEW_FINAL };
+char *lumi_run_view(const struct lumi_run *run, int index, enum lumi_view_part part);
+void lumi_key_view(struct lumi_key *key, const struct lumi_run *run, int index, enum lumi_view_part part);
+
+/* Which images a stage works on. All but the first want a placed run. */
+enum lumi_stage_set {
+    LUMI_SET_FRAMES, /* all, before the run is placed */
+    LUMI_SET_DENSE,  /* all photographs */
+    LUMI_SET_FILLED, /* synthetic or masked */
+    LUMI_SET_KEPT    /* what goes into the field */
+};
+
 /* One stage. The entries are called with indices in [0, run->count). */
 struct lumi_stage {
     const char *name;
     const char *title;     /* for progress: "depth" */
     int version;           /* raise it when the same inputs give other bytes */
     const char *extension; /* of its output files, ".exr" */
-    bool whole;            /* one output for all images (view is called once, with index −1) */
+    bool whole;            /* one output for all images (make is called once, with index −1) */
+    enum lumi_stage_set set;
+    /* Whether it has anything to do at all (index −1), and for an image of its set; NULL: always. */
+    bool (*wanted)(const struct lumi_run *run, int index);
     /* What image `index`'s output depends on, beyond name and version. */
     int (*key)(struct lumi_run *run, int index, struct lumi_key *key, struct lumi_error *error);
     /* Called once before a range with something to do, and after it; may be NULL. */
@@ -106,8 +188,11 @@ struct lumi_stage {
     bool serial;
 };
 
-/* Runs one stage for images [first, last). Outputs that are there already are skipped; their number goes to *skipped
- * (may be NULL). */
+/* How many outputs a stage has with these parameters; 0 where it is not wanted. */
+int lumi_stage_count(const struct lumi_run *run, const struct lumi_stage *stage);
+
+/* Runs one stage for images [first, last), counted within those it works on; last −1: to the end. Outputs that are
+ * there already are skipped; their number goes to *skipped (may be NULL). Nothing happens where it is not wanted. */
 int lumi_run_stage(struct lumi_run *run, const struct lumi_stage *stage, int first, int last, int *skipped,
                    struct lumi_error *error);
 

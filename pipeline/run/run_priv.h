@@ -8,4 +8,7 @@
 bool lumi_run_output_key(const struct lumi_run *run, const char *stage, int index, char *hex);
 void lumi_run_remember_key(const struct lumi_run *run, const char *stage, int index, const char *hex);
 
+/* run->kept anew, from the sources' flags. */
+void run_list_kept(struct lumi_run *run);
+
 #endif

@@ -96,11 +96,52 @@ static int run_job(void *context, int number, int thread)
     return code;
 }
 
-static int find_jobs(struct lumi_run *run, const struct lumi_stage *stage, int first, int last, GArray *jobs,
+static bool in_set(const struct lumi_run *run, const struct lumi_stage *stage, int index)
+{
+    const struct lumi_source *source = &run->sources[index];
+
+    switch (stage->set) {
+    case LUMI_SET_DENSE:
+        return index < run->dense;
+    case LUMI_SET_FILLED:
+        return source->synthetic || source->masked;
+    case LUMI_SET_KEPT:
+        return source->kept;
+    case LUMI_SET_FRAMES:
+        break;
+    }
+    return true;
+}
+
+/* The indices a stage works on; −1 alone where it makes one output for all. */
+static GArray *indices_of(const struct lumi_run *run, const struct lumi_stage *stage)
+{
+    GArray *indices = g_array_new(FALSE, FALSE, sizeof(int));
+    const int all = -1;
+
+    if (stage->wanted && !stage->wanted(run, all))
+        return indices;
+    if (stage->whole)
+        g_array_append_val(indices, all);
+    else
+        for (int i = 0; i < run->count; i++)
+            if (in_set(run, stage, i) && (!stage->wanted || stage->wanted(run, i)))
+                g_array_append_val(indices, i);
+    return indices;
+}
+
+int lumi_stage_count(const struct lumi_run *run, const struct lumi_stage *stage)
+{
+    g_autoptr(GArray) indices = indices_of(run, stage);
+
+    return (int)indices->len;
+}
+
+static int find_jobs(struct lumi_run *run, const struct lumi_stage *stage, const int *indices, int count, GArray *jobs,
                      struct lumi_error *error)
 {
-    for (int index = first; index < last; index++) {
-        struct job job = {.index = stage->whole ? -1 : index};
+    for (int i = 0; i < count; i++) {
+        struct job job = {.index = indices[i]};
         char there[LUMI_KEY_HEX];
         struct lumi_key key;
 
@@ -124,16 +165,24 @@ int lumi_run_stage(struct lumi_run *run, const struct lumi_stage *stage, int fir
 {
     g_autofree char *folder = g_build_filename(run->work, stage->name, NULL);
     g_autoptr(GArray) jobs = g_array_new(FALSE, FALSE, sizeof(struct job));
+    g_autoptr(GArray) indices = indices_of(run, stage);
     struct work work = {.run = run, .stage = stage, .jobs = jobs, .error_index = G_MAXINT, .error = error};
+    const int count = (int)indices->len;
     int code;
 
+    if (skipped)
+        *skipped = 0;
+    if (count == 0)
+        return LUMI_OK;
     if (stage->whole)
         first = 0, last = 1;
-    if (first < 0 || last > (stage->whole ? 1 : run->count) || first > last)
-        return lumi_fail(error, LUMI_ERR_ARG, "range %d:%d: the capture has images 0 to %d", first, last, run->count);
+    last = last < 0 ? count : last;
+    if (first < 0 || last > count || first > last)
+        return lumi_fail(error, LUMI_ERR_ARG, "range %d:%d: the stage '%s' has images 0 to %d", first, last,
+                         stage->name, count);
     if (g_mkdir_with_parents(folder, 0777))
         return lumi_fail_errno(error, folder, "create");
-    LUMI_TRY(find_jobs(run, stage, first, last, jobs, error));
+    LUMI_TRY(find_jobs(run, stage, &g_array_index(indices, int, first), last - first, jobs, error));
     if (skipped)
         *skipped = last - first - (int)jobs->len;
     if (jobs->len == 0)
