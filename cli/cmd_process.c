@@ -1,6 +1,7 @@
 /* lumi process: from a capture to a field. */
 #include "cli/command.h"
 #include "cli/process_options.h"
+#include "pipeline/engine/local.h"
 #include "pipeline/graph/graph.h"
 
 #include <json-glib/json-glib.h>
@@ -95,6 +96,7 @@ static int run_process(int argc, char **argv, struct lumi_error *error)
     LUMI_TRY(process_options_read(&parameters, error));
     LUMI_TRY(lumi_graph_open(argv[0], process_options.work, &parameters, process_options.threads, true, &run, error));
     run->progress = cli_progress;
+    lumi_engine_use_local(run, process_options_say);
     if (as_json) {
         builder = json_builder_new();
         json_builder_begin_object(builder);

@@ -1,6 +1,7 @@
 /* lumi stage: one stage of the pipeline over a range of images. */
 #include "cli/command.h"
 #include "cli/process_options.h"
+#include "pipeline/engine/local.h"
 #include "pipeline/graph/graph.h"
 
 #include <stdio.h>
@@ -37,6 +38,7 @@ static int run_stage(int argc, char **argv, struct lumi_error *error)
     LUMI_TRY(process_options_read(&parameters, error));
     LUMI_TRY(lumi_graph_open(argv[1], process_options.work, &parameters, process_options.threads, false, &run, error));
     run->progress = cli_progress;
+    lumi_engine_use_local(run, process_options_say);
     code = lumi_graph_prepare(run, stage, error);
     const int all = code == LUMI_OK ? lumi_stage_count(run, stage) : 0;
     if (code == LUMI_OK)

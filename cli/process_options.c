@@ -3,6 +3,8 @@
 
 #include "proto/base/geometry.h"
 
+#include <stdio.h>
+
 #include <string.h>
 
 #define NOT_GIVEN (-1000000)
@@ -140,4 +142,10 @@ int process_options_read(struct lumi_parameters *parameters, struct lumi_error *
         parameters->fov_y = degrees[1] * LUMI_PI / 180;
     }
     return LUMI_OK;
+}
+
+void process_options_say(const char *line)
+{
+    cli_progress_end();
+    fprintf(stderr, "lumi: %s\n", line);
 }

@@ -42,4 +42,7 @@ extern struct process_options process_options;
 /* Checks them and fills the parameters. */
 int process_options_read(struct lumi_parameters *parameters, struct lumi_error *error);
 
+/* A line about the run on standard error. */
+void process_options_say(const char *line);
+
 #endif

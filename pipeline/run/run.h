@@ -93,6 +93,7 @@ struct lumi_wants {
     bool calibrate, equalize, synthesize, subsample, prefilter, color;
 };
 
+struct lumi_stage;
 struct lumi_run {
     char *capture, *work; /* directories; work lies beside the capture */
     struct lumi_rig *rig; /* the capture's profile; NULL: none */
@@ -109,6 +110,8 @@ struct lumi_run {
     double radius;
     struct lumi_parameters parameters;
     int threads; /* as lumi_parallel_for */
+    /* Asked before a stage with `images` outputs to make: how many at once. NULL: run->threads. */
+    int (*parallel)(struct lumi_run *run, const struct lumi_stage *stage, int images);
     /* Told after each image, by one thread at a time; may be NULL. */
     void (*progress)(const char *title, long done, long total);
     struct lumi_run_private *priv;
@@ -186,6 +189,9 @@ struct lumi_stage {
      * at once for different images, unless `serial` (then the stage uses run->threads itself). */
     int (*make)(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error);
     bool serial;
+    /* What one image in work holds at most, bytes a pixel of the larger of its source and its view (measured:
+     * tests/bench/process.sh); an engine makes no more images at once than there is memory for. 0: next to nothing. */
+    double bytes_per_pixel;
 };
 
 /* How many outputs a stage has with these parameters; 0 where it is not wanted. */

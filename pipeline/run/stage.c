@@ -190,7 +190,8 @@ int lumi_run_stage(struct lumi_run *run, const struct lumi_stage *stage, int fir
     if (stage->begin)
         LUMI_TRY(stage->begin(run, &work.state, error));
     pthread_mutex_init(&work.lock, NULL);
-    code = lumi_parallel_for((int)jobs->len, stage->serial || stage->whole ? 1 : run->threads, run_job, &work);
+    const int threads = run->parallel ? run->parallel(run, stage, (int)jobs->len) : run->threads;
+    code = lumi_parallel_for((int)jobs->len, stage->serial || stage->whole ? 1 : threads, run_job, &work);
     pthread_mutex_destroy(&work.lock);
     if (stage->end)
         stage->end(run, work.state);

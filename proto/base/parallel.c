@@ -1,9 +1,11 @@
 /* A parallel loop over pthreads: items are handed out by one atomic counter. */
+#define _GNU_SOURCE /* sched_getaffinity, CPU_COUNT */
 #include "proto/base/parallel.h"
 
 #include "proto/base/result.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <stdatomic.h>
 #include <unistd.h>
 
@@ -53,7 +55,10 @@ static void *work(void *argument)
 int lumi_thread_count(void)
 {
     long count = sysconf(_SC_NPROCESSORS_ONLN);
+    cpu_set_t set;
 
+    if (!sched_getaffinity(0, sizeof set, &set))
+        count = CPU_COUNT(&set);
     return count < 1 ? 1 : count > MAX_THREADS ? MAX_THREADS : (int)count;
 }
 

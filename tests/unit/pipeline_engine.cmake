@@ -1,0 +1,1 @@
+lumi_test(test_resources FOLDERS pipeline_engine)
