@@ -64,7 +64,8 @@ FILENAME == table {
     known[folder] = 1
     short = folder
     sub(/.*\//, "", short)
-    long_name[short] = folder
+    if ($1 == "may") # of two folders of one name, the later of these has the short one
+        long_name[short] = folder
     joined = folder
     gsub(/\//, "_", joined) # firmware/core is also firmware_core
     long_name[joined] = folder
