@@ -4,6 +4,7 @@
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
 #include "render/cpu/compose.h"
+#include "render/cpu/ray_renderer.h"
 #include "render/cpu/view_shade.h"
 
 #include <string.h>
@@ -13,10 +14,10 @@
 
 struct render {
     struct lumi_viewset *set;
-    const struct lumi_pose *pose;
+    struct lumi_vec3 eye;
     const struct lumi_disk_settings *settings;
     struct lumi_shade_settings shade;
-    struct lumi_rays rays;
+    const struct lumi_rays *rays;
     int *visible, visible_count; /* views, in the set's order */
     struct lumi_surface_view surfaces[GROUP];
     struct lumi_source_image images[GROUP];
@@ -24,7 +25,7 @@ struct render {
     const int *group; /* of `visible` */
     int group_count;
     bool depth_pass; /* only finds the nearest surface (inter-image test) */
-    struct lumi_sums sums;
+    struct lumi_sums *sums;
     float *nearest;                    /* inter-image test: of all views */
     struct lumi_block_buffer *buffers; /* one a thread */
     int threads;
@@ -55,10 +56,10 @@ static int find_visible(void *context, int index, int thread)
     struct lumi_surface_view surface;
 
     (void)thread;
-    lumi_surface_place(&surface, lumi_viewset_view(render->set, index), render->pose->t, render->settings->disk_scale);
+    lumi_surface_place(&surface, lumi_viewset_view(render->set, index), render->eye, render->settings->disk_scale);
     render->visible[index] = -1;
-    for (int b = 0; b < render->rays.block_cols * render->rays.block_rows; b++)
-        if (!lumi_surface_hidden(&surface, &render->rays.blocks[b])) {
+    for (int b = 0; b < render->rays->block_cols * render->rays->block_rows; b++)
+        if (!lumi_surface_hidden(&surface, &render->rays->blocks[b])) {
             render->visible[index] = index;
             break;
         }
@@ -76,7 +77,7 @@ static int prepare_view(void *context, int index, int thread)
     image->filter = render->settings->filter;
     image->linear = render->settings->linear_light;
     image->missing = NULL;
-    lumi_surface_place(surface, lumi_viewset_view(render->set, view), render->pose->t, render->settings->disk_scale);
+    lumi_surface_place(surface, lumi_viewset_view(render->set, view), render->eye, render->settings->disk_scale);
     LUMI_TRY(lumi_viewset_acquire(render->set, view, &image->pixels, &image->missing, &render->errors[index]));
     int code = lumi_surface_build(surface);
     if (code == LUMI_OK)
@@ -92,16 +93,16 @@ static int draw_view_undepthed(struct render *render, struct lumi_block_buffer *
     for (int p = 0; p < surface->patch_count; p++) {
         const struct lumi_patch *patch = &surface->patches[p];
         if ((render->images[index].missing && render->images[index].missing[patch->tile]) ||
-            lumi_cones_apart(&patch->cone, &render->rays.blocks[block]))
+            lumi_cones_apart(&patch->cone, &render->rays->blocks[block]))
             continue;
         for (int i = 0; i < patch->triangle_count; i++) {
-            int drawn = lumi_block_draw_one(buffer, &render->rays, block, surface, patch, i);
+            int drawn = lumi_block_draw_one(buffer, render->rays, block, surface, patch, i);
             if (drawn < 0)
                 return drawn;
             if (!drawn)
                 continue;
-            lumi_shade_block(buffer, &render->rays, block, surface, &render->images[index], &render->shade, NULL,
-                             &render->sums);
+            lumi_shade_block(buffer, render->rays, block, surface, &render->images[index], &render->shade, NULL,
+                             render->sums);
             lumi_block_clear(buffer);
         }
     }
@@ -117,8 +118,8 @@ static void note_nearest(struct render *render, const struct lumi_block_buffer *
         size_t at = first + (size_t)i;
         float u, v;
         if (buffer->record[i] >= 0 && buffer->nearness[i] > render->nearest[at] &&
-            lumi_shade_weight(&render->surfaces[index], &render->shade, render->rays.x[at], render->rays.y[at],
-                              render->rays.z[at], &u, &v) > 0)
+            lumi_shade_weight(&render->surfaces[index], &render->shade, render->rays->x[at], render->rays->y[at],
+                              render->rays->z[at], &u, &v) > 0)
             render->nearest[at] = buffer->nearness[i];
     }
 }
@@ -127,7 +128,7 @@ static int draw_block(void *context, int block, int thread)
 {
     struct render *render = context;
     struct lumi_block_buffer *buffer = &render->buffers[thread];
-    const struct lumi_cone *cone = &render->rays.blocks[block];
+    const struct lumi_cone *cone = &render->rays->blocks[block];
 
     for (int k = 0; k < render->group_count; k++) {
         const struct lumi_surface_view *surface = &render->surfaces[k];
@@ -140,13 +141,13 @@ static int draw_block(void *context, int block, int thread)
         }
         for (int p = 0; p < surface->patch_count; p++)
             if (!render->images[k].missing || !render->images[k].missing[surface->patches[p].tile])
-                LUMI_TRY(lumi_block_draw(buffer, &render->rays, block, surface, &surface->patches[p]));
+                LUMI_TRY(lumi_block_draw(buffer, render->rays, block, surface, &surface->patches[p]));
         if (render->depth_pass)
             note_nearest(render, buffer, block, k);
         else
-            lumi_shade_block(buffer, &render->rays, block, surface, &render->images[k], &render->shade,
+            lumi_shade_block(buffer, render->rays, block, surface, &render->images[k], &render->shade,
                              render->nearest ? render->nearest + (size_t)block * LUMI_BLOCK_PIXELS : NULL,
-                             &render->sums);
+                             render->sums);
     }
     return LUMI_OK;
 }
@@ -164,7 +165,7 @@ static int draw_group(struct render *render, const int *group, int count, struct
                 *error = render->errors[i];
     } else {
         code =
-            lumi_parallel_for(render->rays.block_cols * render->rays.block_rows, render->threads, draw_block, render);
+            lumi_parallel_for(render->rays->block_cols * render->rays->block_rows, render->threads, draw_block, render);
         if (code != LUMI_OK)
             lumi_fail(error, code, "no memory while drawing");
     }
@@ -191,7 +192,8 @@ static int draw_all(struct render *render, struct lumi_error *error)
     return LUMI_OK;
 }
 
-static int render_all(struct render *render, struct lumi_picture *picture, struct lumi_error *error)
+/* All views' sums for all rays. */
+static int sum_views(struct render *render, struct lumi_error *error)
 {
     int views = lumi_viewset_count(render->set), count = 0;
 
@@ -199,27 +201,24 @@ static int render_all(struct render *render, struct lumi_picture *picture, struc
     render->buffers = lumi_calloc((size_t)render->threads, sizeof *render->buffers);
     if (!render->visible || !render->buffers)
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to render");
-    LUMI_TRY(lumi_sums_create(&render->sums, render->rays.pixels, error));
     lumi_parallel_for(views, render->threads, find_visible, render);
     for (int i = 0; i < views; i++)
         if (render->visible[i] >= 0)
             render->visible[count++] = i;
     render->visible_count = count;
     if (render->settings->depth_test == LUMI_DEPTH_INTER) {
-        render->nearest = lumi_calloc(render->rays.pixels, sizeof(float));
+        render->nearest = lumi_calloc(render->rays->pixels, sizeof(float));
         if (!render->nearest)
             return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to render");
         render->depth_pass = true;
         LUMI_TRY(draw_all(render, error));
         render->depth_pass = false;
     }
-    LUMI_TRY(draw_all(render, error));
-    return lumi_compose(&render->rays, &render->sums, render->settings->linear_light, render->settings->sample,
-                        render->threads, picture, error);
+    return draw_all(render, error);
 }
 
-int lumi_render_disks(struct lumi_viewset *set, const struct lumi_lens *lens, const struct lumi_pose *pose,
-                      const struct lumi_disk_settings *settings, struct lumi_picture *picture, struct lumi_error *error)
+int lumi_render_rays(struct lumi_viewset *set, const struct lumi_rays *rays, struct lumi_vec3 eye,
+                     const struct lumi_disk_settings *settings, struct lumi_sums *sums, struct lumi_error *error)
 {
     struct lumi_disk_settings defaults;
     struct render *render;
@@ -232,24 +231,44 @@ int lumi_render_disks(struct lumi_viewset *set, const struct lumi_lens *lens, co
     if (!render)
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to render");
     render->set = set;
-    render->pose = pose;
+    render->eye = eye;
     render->settings = settings;
+    render->rays = rays;
+    render->sums = sums;
     render->threads = settings->threads > 0 ? settings->threads : lumi_thread_count();
     render->shade = (struct lumi_shade_settings){
         .shape = lumi_viewset_shape(set),
         .kernel = settings->kernel >= 0 ? (enum lumi_disk_kernel)settings->kernel : lumi_viewset_kernel(set),
         .disk_scale = settings->disk_scale,
         .stretch = settings->stretch};
-    int code = lumi_rays_init(&render->rays, lens, pose, render->threads, error);
-    if (code == LUMI_OK)
-        code = render_all(render, picture, error);
+    int code = sum_views(render, error);
     for (int i = 0; render->buffers && i < render->threads; i++)
         lumi_block_finish(&render->buffers[i]);
-    lumi_sums_finish(&render->sums);
-    lumi_rays_finish(&render->rays);
     lumi_free(render->buffers);
     lumi_free(render->visible);
     lumi_free(render->nearest);
     lumi_free(render);
+    return code;
+}
+
+int lumi_render_disks(struct lumi_viewset *set, const struct lumi_lens *lens, const struct lumi_pose *pose,
+                      const struct lumi_disk_settings *settings, struct lumi_picture *picture, struct lumi_error *error)
+{
+    struct lumi_disk_settings defaults;
+    struct lumi_rays rays;
+    struct lumi_sums sums = {0};
+    int code;
+
+    lumi_disk_settings_default(&defaults);
+    settings = settings ? settings : &defaults;
+    const int threads = settings->threads > 0 ? settings->threads : lumi_thread_count();
+    LUMI_TRY(check_settings(settings, error));
+    LUMI_TRY(lumi_rays_init(&rays, lens, pose, threads, error));
+    LUMI_GOTO(code, done, lumi_sums_create(&sums, rays.pixels, error));
+    LUMI_GOTO(code, done, lumi_render_rays(set, &rays, pose->t, settings, &sums, error));
+    code = lumi_compose(&rays, &sums, settings->linear_light, settings->sample, threads, picture, error);
+done:
+    lumi_sums_finish(&sums);
+    lumi_rays_finish(&rays);
     return code;
 }

@@ -3,6 +3,7 @@
 
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
+#include "proto/base/raster.h"
 
 #include <math.h>
 #include <string.h>
@@ -37,6 +38,18 @@ struct lumi_cone lumi_cone_around(const float *x, const float *y, const float *z
     return cone;
 }
 
+void lumi_rays_bound(struct lumi_rays *rays, int block)
+{
+    size_t first = (size_t)block * LUMI_BLOCK_PIXELS;
+
+    for (int i = 0; i < LUMI_BLOCK_CELLS; i++) {
+        size_t at = first + (size_t)i * LUMI_CELL_PIXELS;
+        rays->cells[block * LUMI_BLOCK_CELLS + i] =
+            lumi_cone_around(rays->x + at, rays->y + at, rays->z + at, LUMI_CELL_PIXELS, 1);
+    }
+    rays->blocks[block] = lumi_cone_around(rays->x + first, rays->y + first, rays->z + first, LUMI_BLOCK_PIXELS, 1);
+}
+
 struct fill {
     struct lumi_rays *rays;
     const struct lumi_lens *lens;
@@ -49,7 +62,6 @@ static int fill_block(void *context, int block, int thread)
     struct fill *fill = context;
     struct lumi_rays *rays = fill->rays;
     int x0 = block % rays->block_cols * LUMI_BLOCK, y0 = block / rays->block_cols * LUMI_BLOCK;
-    size_t first = (size_t)block * LUMI_BLOCK_PIXELS;
 
     (void)thread;
     for (int y = y0; y < y0 + LUMI_BLOCK && y < rays->height; y++)
@@ -62,12 +74,37 @@ static int fill_block(void *context, int block, int thread)
             rays->x[at] = (float)d.x, rays->y[at] = (float)d.y, rays->z[at] = (float)d.z;
             fill->imaged[block]++;
         }
-    for (int i = 0; i < LUMI_BLOCK_CELLS; i++) {
-        size_t at = first + (size_t)i * LUMI_CELL_PIXELS;
-        rays->cells[block * LUMI_BLOCK_CELLS + i] =
-            lumi_cone_around(rays->x + at, rays->y + at, rays->z + at, LUMI_CELL_PIXELS, 1);
-    }
-    rays->blocks[block] = lumi_cone_around(rays->x + first, rays->y + first, rays->z + first, LUMI_BLOCK_PIXELS, 1);
+    lumi_rays_bound(rays, block);
+    return LUMI_OK;
+}
+
+/* Tables for block_cols × block_rows blocks. */
+static int allocate(struct lumi_rays *rays, struct lumi_error *error)
+{
+    size_t blocks = (size_t)rays->block_cols * (size_t)rays->block_rows;
+
+    rays->pixels = blocks * LUMI_BLOCK_PIXELS;
+    rays->x = lumi_calloc(rays->pixels, sizeof(float));
+    rays->y = lumi_calloc(rays->pixels, sizeof(float));
+    rays->z = lumi_calloc(rays->pixels, sizeof(float));
+    rays->blocks = lumi_calloc(blocks, sizeof *rays->blocks);
+    rays->cells = lumi_calloc(blocks * LUMI_BLOCK_CELLS, sizeof *rays->cells);
+    if (rays->x && rays->y && rays->z && rays->blocks && rays->cells)
+        return LUMI_OK;
+    const int width = rays->width, height = rays->height;
+    lumi_rays_finish(rays);
+    return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a picture of %d×%d", width, height);
+}
+
+int lumi_rays_init_blocks(struct lumi_rays *rays, int blocks, struct lumi_error *error)
+{
+    *rays =
+        (struct lumi_rays){.width = LUMI_BLOCK, .height = LUMI_BLOCK * blocks, .block_cols = 1, .block_rows = blocks};
+    if (blocks < 1 || blocks > LUMI_RASTER_MAX)
+        return lumi_fail(error, LUMI_ERR_ARG, "a table of %d blocks of rays", blocks);
+    LUMI_TRY(allocate(rays, error));
+    for (int i = 0; i < blocks; i++)
+        lumi_rays_bound(rays, i);
     return LUMI_OK;
 }
 
@@ -83,16 +120,10 @@ int lumi_rays_init(struct lumi_rays *rays, const struct lumi_lens *lens, const s
     rays->height = lens->height;
     rays->block_cols = (lens->width + LUMI_BLOCK - 1) / LUMI_BLOCK;
     rays->block_rows = (lens->height + LUMI_BLOCK - 1) / LUMI_BLOCK;
+    LUMI_TRY(allocate(rays, error));
     size_t blocks = (size_t)rays->block_cols * (size_t)rays->block_rows;
-    rays->pixels = blocks * LUMI_BLOCK_PIXELS;
-    rays->x = lumi_calloc(rays->pixels, sizeof(float));
-    rays->y = lumi_calloc(rays->pixels, sizeof(float));
-    rays->z = lumi_calloc(rays->pixels, sizeof(float));
-    rays->blocks = lumi_calloc(blocks, sizeof *rays->blocks);
-    rays->cells = lumi_calloc(blocks * LUMI_BLOCK_CELLS, sizeof *rays->cells);
     long *imaged = lumi_calloc(blocks, sizeof *imaged);
-    if (!rays->x || !rays->y || !rays->z || !rays->blocks || !rays->cells || !imaged) {
-        lumi_free(imaged);
+    if (!imaged) {
         lumi_rays_finish(rays);
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a picture of %d×%d", lens->width, lens->height);
     }

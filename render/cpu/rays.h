@@ -19,6 +19,10 @@
 #define LUMI_CELL_PIXELS 64
 #define LUMI_BLOCK_CELLS 16
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Directions within an angle of an axis. sine > 1: no bound (nothing may be concluded); cosine > 1: empty. */
 struct lumi_cone {
     float x, y, z, cosine, sine;
@@ -53,6 +57,11 @@ static inline int lumi_cones_apart(const struct lumi_cone *a, const struct lumi_
 
 int lumi_rays_init(struct lumi_rays *rays, const struct lumi_lens *lens, const struct lumi_pose *pose, int threads,
                    struct lumi_error *error);
+/* Room for `blocks` blocks of rays of the caller's own, all zero: a picture 32 pixels wide, block under block. Fill x,
+ * y and z in the layout above, then bound every block that was filled. */
+int lumi_rays_init_blocks(struct lumi_rays *rays, int blocks, struct lumi_error *error);
+/* Finds the cones of a block and of its cells. */
+void lumi_rays_bound(struct lumi_rays *rays, int block);
 void lumi_rays_finish(struct lumi_rays *rays);
 
 /* Where pixel (x, y) lies in the tables. */
@@ -64,4 +73,7 @@ static inline size_t lumi_rays_at(const struct lumi_rays *rays, int x, int y)
     return block * LUMI_BLOCK_PIXELS + (size_t)(cell * LUMI_CELL_PIXELS + y % LUMI_CELL * LUMI_CELL + x % LUMI_CELL);
 }
 
+#ifdef __cplusplus
+}
+#endif
 #endif

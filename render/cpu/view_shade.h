@@ -5,6 +5,10 @@
 #include "render/cpu/disk_renderer.h"
 #include "render/cpu/raster_block.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Sums over the views, in the layout of the rays. */
 struct lumi_sums {
     float *r, *g, *b, *weight, *nearness;
@@ -40,4 +44,7 @@ void lumi_shade_block(const struct lumi_block_buffer *buffer, const struct lumi_
 /* sRGB bytes in linear light: lumi_srgb_decode(i / 255). */
 void lumi_shade_tables(void);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
