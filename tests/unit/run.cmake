@@ -1,1 +1,2 @@
 lumi_test(test_run FOLDERS run LABELS threads)
+lumi_test(test_places FOLDERS run)

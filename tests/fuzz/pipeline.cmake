@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_places FOLDERS run base)
