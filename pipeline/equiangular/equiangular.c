@@ -1,6 +1,7 @@
 /* The stage `equiangular` (Overbeck et al. 2018, section 7.1). */
 #include "pipeline/equiangular/equiangular.h"
 
+#include "pipeline/equiangular/gains.h"
 #include "pipeline/equiangular/warp.h"
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
@@ -17,6 +18,7 @@ struct state {
     int count;
     struct lumi_lens lenses[KEPT_WARPS];
     struct lumi_warp *warps[KEPT_WARPS];
+    struct lumi_gains gains; /* none where nothing is equalised */
 };
 
 static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
@@ -30,6 +32,8 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
         lumi_key_double(k, run->grid.tan_x[i]);
     for (int i = 0; i <= run->grid.rows; i++)
         lumi_key_double(k, run->grid.tan_y[i]);
+    if (run->wants.equalize)
+        lumi_key_input(k, run, "equalize", -1);
     return LUMI_OK;
 }
 
@@ -42,6 +46,7 @@ static void end(struct lumi_run *run, void *pointer)
         return;
     for (int i = 0; i < state->count; i++)
         lumi_warp_destroy(state->warps[i]);
+    lumi_gains_finish(&state->gains);
     lumi_free(state);
 }
 
@@ -60,6 +65,13 @@ static int make_warp(void *context, int index, int thread)
                             &making->errors[index]);
 }
 
+static int read_gains(const struct lumi_run *run, struct lumi_gains *gains, struct lumi_error *error)
+{
+    g_autofree char *path = lumi_run_path(run, "equalize", -1, ".json");
+
+    return lumi_gains_read(path, gains, error);
+}
+
 static int begin(struct lumi_run *run, void **pointer, struct lumi_error *error)
 {
     struct state *state = lumi_calloc(1, sizeof *state);
@@ -70,6 +82,8 @@ static int begin(struct lumi_run *run, void **pointer, struct lumi_error *error)
         result = lumi_fail(error, LUMI_ERR_NOMEM, "out of memory");
         goto done;
     }
+    if (run->wants.equalize)
+        LUMI_GOTO(result, done, read_gains(run, &state->gains, error));
     for (int i = 0; i < run->count && state->count < KEPT_WARPS; i++) {
         const struct lumi_lens *lens = &run->sources[i].lens;
         int k = 0;
@@ -139,8 +153,9 @@ static int resample(const struct lumi_run *run, const struct state *state, const
     return result;
 }
 
-static int make(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error)
+static int make(struct lumi_run *run, void *pointer, int index, int thread, const char *path, struct lumi_error *error)
 {
+    struct state *state = pointer;
     const struct lumi_source *source = &run->sources[index];
     struct lumi_image_options options;
     struct lumi_raster image;
@@ -148,6 +163,9 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
     (void)thread;
     LUMI_TRY(read_linear(run, index, &image, error));
     int result = LUMI_OK;
+    if (state->gains.count > 0)
+        lumi_gains_apply(&state->gains, lumi_gains_find(&state->gains, source->name), &source->lens,
+                         source->part_count == 0, &image);
     if (!lumi_warp_is_copy(&source->lens, &run->grid)) {
         result = resample(run, state, source, &image, error);
         if (result != LUMI_OK)

@@ -4,12 +4,12 @@
 
 #include <math.h>
 
-#define WHITE 0.98f        /* at and above: clipped */
-#define NEAR_WHITE 0.9f    /* from here on a value counts less */
-#define RELATIVE 0.03f     /* of the value: response and exposure are not exact */
-#define SHIFT 0.25f        /* pixels */
-#define AGREES 2.0f        /* standard deviations: up to here nothing moved */
-#define DIFFERS 4.0f       /* and from here on something did */
+#define WHITE 0.98f     /* at and above: clipped */
+#define NEAR_WHITE 0.9f /* from here on a value counts less */
+#define RELATIVE 0.03f  /* of the value: response and exposure are not exact */
+#define SHIFT 0.25f     /* pixels */
+#define AGREES 2.0f     /* standard deviations: up to here nothing moved */
+#define DIFFERS 4.0f    /* and from here on something did */
 enum { GROW = 4, SOFTEN = 3 };
 
 float lumi_shot_variance(const struct lumi_shot *shot, const struct lumi_merge_options *options, float v)
@@ -78,8 +78,8 @@ static void spread(const struct lumi_raster *from, struct lumi_raster *to, bool 
         for (int x = 0; x < from->width; x++) {
             float most = 0, sum = 0;
             for (int i = -reach; i <= reach; i++) {
-                float v = lumi_row_f32(from, across ? y : clamp(y + i, from->height))[across ? clamp(x + i, from->width)
-                                                                                              : x];
+                float v =
+                    lumi_row_f32(from, across ? y : clamp(y + i, from->height))[across ? clamp(x + i, from->width) : x];
                 most = fmaxf(most, v);
                 sum += v;
             }
@@ -94,8 +94,8 @@ static void judge(const struct lumi_raster *differences, struct lumi_raster *map
         for (int x = 0; x < map->width; x++) {
             float sum[3] = {0, 0, 0}, most = 0;
             for (int i = 0; i < 9; i++) {
-                const float *d = lumi_row_f32(differences, clamp(y - 1 + i / 3, map->height)) +
-                                 3 * clamp(x - 1 + i % 3, map->width);
+                const float *d =
+                    lumi_row_f32(differences, clamp(y - 1 + i / 3, map->height)) + 3 * clamp(x - 1 + i % 3, map->width);
                 for (int c = 0; c < 3; c++)
                     sum[c] += d[c] / 9;
             }

@@ -59,13 +59,12 @@ static void settle_exposure(const struct lumi_shot *reference, struct lumi_shot 
 {
     long pixels;
     double ratio = lumi_shot_ratio(&reference->light, &shot->light, &pixels);
-    double mean_here = well_exposed(&shot->light);
 
     report->measured = pixels >= LEAST_RATIO_PIXELS ? ratio : 0;
     if (!(shot->exposure > 0)) {
         report->guessed = true;
         shot->exposure = reference->exposure * (report->measured > 0 ? ratio : 1);
-        if (!(report->measured > 0) && mean_here < 0.01)
+        if (!(report->measured > 0) && well_exposed(&shot->light) < 0.01)
             report->fate = LUMI_SHOT_BLACK;
     } else if (report->measured > 0) {
         double told = shot->exposure / reference->exposure, stops = log2(ratio / told);
@@ -106,8 +105,8 @@ static int align(const struct lumi_shot *reference, struct lumi_shot *shot, stru
 {
     struct lumi_raster moved;
 
-    LUMI_TRY(lumi_shot_shift(&reference->light, &shot->light, reference->exposure / shot->exposure, &report->shift,
-                             error));
+    LUMI_TRY(
+        lumi_shot_shift(&reference->light, &shot->light, reference->exposure / shot->exposure, &report->shift, error));
     if (fabs(report->shift.x) < LEAST_SHIFT && fabs(report->shift.y) < LEAST_SHIFT)
         return LUMI_OK;
     LUMI_TRY(lumi_shot_move(&shot->light, &report->shift, &moved, error));
@@ -150,8 +149,7 @@ static bool merge_pixel(const struct merging *m, int x, int y, float out[3])
                 float exposure = (float)m->shots[k].exposure / m->nominal;
                 float value = lumi_row_f32(&m->shots[k].light, y)[3 * x + c];
                 float expected = round == 0 ? value : fminf(light[c] * exposure, 1);
-                float weight = share[k] * exposure * exposure /
-                               lumi_shot_variance(&m->shots[k], m->options, expected);
+                float weight = share[k] * exposure * exposure / lumi_shot_variance(&m->shots[k], m->options, expected);
                 sum += weight * value / exposure;
                 weights += weight;
             }
@@ -194,8 +192,8 @@ static int prepare(struct merging *m, struct lumi_error *error)
     return LUMI_OK;
 }
 
-int lumi_merge(struct lumi_shot *shots, int count, const struct lumi_merge_options *options,
-               struct lumi_raster *result, struct lumi_merge_report *report, struct lumi_error *error)
+int lumi_merge(struct lumi_shot *shots, int count, const struct lumi_merge_options *options, struct lumi_raster *result,
+               struct lumi_merge_report *report, struct lumi_error *error)
 {
     struct merging m = {.shots = shots, .options = options, .report = report, .count = count};
     long clipped = 0;

@@ -52,7 +52,7 @@ void lumi_merge_options_init(struct lumi_merge_options *options);
  * the shot in which most pixels are well exposed. Clipped parts of a shot say nothing; of the rest each value weighs by
  * the inverse of its variance; where a shot differs from the reference by more than noise, the reference wins. The
  * shots' pixels are changed in place by alignment. LUMI_ERR_FORMAT if no shot is left. */
-int lumi_merge(struct lumi_shot *shots, int count, const struct lumi_merge_options *options,
-               struct lumi_raster *result, struct lumi_merge_report *report, struct lumi_error *error);
+int lumi_merge(struct lumi_shot *shots, int count, const struct lumi_merge_options *options, struct lumi_raster *result,
+               struct lumi_merge_report *report, struct lumi_error *error);
 
 #endif

@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char magic[] = "lumisphere-response 1";
-
 void lumi_response_srgb(struct lumi_response *response)
 {
     for (int c = 0; c < 3; c++)
@@ -24,11 +22,6 @@ void lumi_response_linear(struct lumi_response *response)
             response->light[c][z] = (float)z / 255;
 }
 
-static bool is_magic(const char *line)
-{
-    return !strncmp(line, magic, sizeof magic - 1) && line[sizeof magic - 1 + strspn(line + sizeof magic - 1, " \r")] == '\0';
-}
-
 /* Three numbers of a line; false where there are fewer, or more than they. */
 static bool three(const char *line, float numbers[3])
 {
@@ -39,56 +32,98 @@ static bool three(const char *line, float numbers[3])
             return false;
         line = end;
     }
-    return line[strspn(line, " \t\r")] == '\0';
+    return *line == '\0';
 }
 
-int lumi_response_parse(const char *text, size_t size, const char *name, struct lumi_response *response,
-                        struct lumi_error *error)
-{
-    const char *at = text, *stop = text + size;
-    char line[128];
-    int row = -1;
+struct reading {
+    const char *name, *camera;
+    struct lumi_response table, *result;
+    int number, row;  /* of the line; of the table, 256 between tables, −1 before the first line */
+    bool mine, found; /* the table is the wanted camera's */
+};
 
-    for (int number = 1; at < stop; number++) {
-        const char *end = memchr(at, '\n', (size_t)(stop - at));
-        size_t length = (size_t)((end ? end : stop) - at);
-        if (length >= sizeof line || memchr(at, '\0', length))
-            return lumi_fail(error, LUMI_ERR_FORMAT, "%s: line %d is none of a response", name, number);
-        memcpy(line, at, length);
-        line[length] = '\0';
-        at = end ? end + 1 : stop;
-        if (row >= 0 && (line[0] == '#' || line[strspn(line, " \t\r")] == '\0'))
-            continue;
-        float numbers[3] = {0, 0, 0};
-        bool good = row < 0 ? is_magic(line)
-                            : row < 256 && three(line, numbers);
-        for (int c = 0; good && row >= 0 && c < 3; c++) {
-            good = row == 0 || numbers[c] >= response->light[c][row - 1];
-            response->light[c][row] = numbers[c];
-        }
-        if (!good)
-            return lumi_fail(error, LUMI_ERR_FORMAT,
-                             row < 0 ? "%s: line %d: '%s' wanted" : "%s: line %d: three numbers from 0 to 1 wanted, none "
-                                                                    "below those before, 256 lines of them",
-                             name, number, magic);
-        row++;
+static int fail_line(const struct reading *r, const char *what, struct lumi_error *error)
+{
+    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: line %d: %s", r->name, r->number, what);
+}
+
+static int take_row(struct reading *r, const char *line, struct lumi_error *error)
+{
+    float numbers[3];
+
+    if (r->row == 256)
+        return fail_line(r, "more than 256 codes", error);
+    if (!three(line, numbers))
+        return fail_line(r, "three numbers from 0 to 1 wanted", error);
+    for (int c = 0; c < 3; c++) {
+        if (r->row > 0 && !(numbers[c] >= r->table.light[c][r->row - 1]))
+            return fail_line(r, "less light than for the code before", error);
+        if (r->row == 255 && !(numbers[c] > 0))
+            return fail_line(r, "a channel that never sees light", error);
+        r->table.light[c][r->row] = numbers[c];
     }
-    if (row != 256)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: ends after %d of 256 codes", name, row < 0 ? 0 : row);
-    for (int c = 0; c < 3; c++)
-        if (!(response->light[c][255] > 0))
-            return lumi_fail(error, LUMI_ERR_FORMAT, "%s: a channel that never sees light", name);
+    if (++r->row == 256 && r->mine && !r->found) {
+        *r->result = r->table;
+        r->found = true;
+    }
     return LUMI_OK;
 }
 
-int lumi_response_format(const struct lumi_response *response, char **text, struct lumi_error *error)
+static int take_line(struct reading *r, const char *line, struct lumi_error *error)
 {
-    size_t room = 256 * 64 + sizeof magic + 2, used;
+    if (r->row < 0) {
+        if (strcmp(line, "lumisphere-response 1"))
+            return fail_line(r, "'lumisphere-response 1' wanted", error);
+        r->row = 0;
+        r->mine = true;
+        return LUMI_OK;
+    }
+    if (line[0] == '#' || line[0] == '\0')
+        return LUMI_OK;
+    if (strncmp(line, "camera ", 7))
+        return take_row(r, line, error);
+    if (r->row != 0 && r->row != 256)
+        return fail_line(r, "a camera before the 256 codes of the one before", error);
+    r->row = 0;
+    r->mine = !strcmp(line + 7, r->camera);
+    return LUMI_OK;
+}
+
+int lumi_response_parse(const char *text, size_t size, const char *name, const char *camera,
+                        struct lumi_response *response, struct lumi_error *error)
+{
+    struct reading r = {.name = name, .camera = camera, .result = response, .row = -1};
+    char line[160];
+
+    for (size_t at = 0; at < size;) {
+        const char *end = memchr(text + at, '\n', size - at);
+        size_t length = end ? (size_t)(end - text) - at : size - at, trimmed = length;
+        r.number++;
+        if (length >= sizeof line || memchr(text + at, '\0', length))
+            return fail_line(&r, "too long, or no text", error);
+        while (trimmed > 0 && strchr(" \t\r", text[at + trimmed - 1]))
+            trimmed--;
+        memcpy(line, text + at, trimmed);
+        line[trimmed] = '\0';
+        at += length + 1;
+        LUMI_TRY(take_line(&r, line, error));
+    }
+    if (r.row != 256)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: ends after %d of 256 codes", name, r.row < 0 ? 0 : r.row);
+    if (!r.found)
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: has no response of camera %s", name, camera);
+    return LUMI_OK;
+}
+
+int lumi_response_format(const struct lumi_response *response, const char *camera, char **text,
+                         struct lumi_error *error)
+{
+    size_t room = 256 * 64 + 256, used;
 
     *text = lumi_alloc(room, 1);
     if (!*text)
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a response");
-    used = (size_t)snprintf(*text, room, "%s\n", magic);
+    used = (size_t)snprintf(*text, room, "camera %.100s\n", camera);
     for (int z = 0; z < 256; z++)
         used += (size_t)snprintf(*text + used, room - used, "%.9g %.9g %.9g\n", (double)response->light[0][z],
                                  (double)response->light[1][z], (double)response->light[2][z]);

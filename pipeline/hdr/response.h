@@ -15,12 +15,15 @@ void lumi_response_srgb(struct lumi_response *response);
 /* Codes that are proportional to light. */
 void lumi_response_linear(struct lumi_response *response);
 
-/* The text form (docs/hdr.md): "lumisphere-response 1", then 256 lines of three numbers. `name` stands for the file in
- * errors. */
-int lumi_response_parse(const char *text, size_t size, const char *name, struct lumi_response *response,
-                        struct lumi_error *error);
-/* Release *text with lumi_free. */
-int lumi_response_format(const struct lumi_response *response, char **text, struct lumi_error *error);
+/* The text form (docs/hdr.md): "lumisphere-response 1", then 256 lines of three numbers; or several such tables, each
+ * after a line "camera NAME". `camera`: whose is wanted; a table without a name is everybody's. `name` stands for the
+ * file in errors. LUMI_ERR_NOTFOUND: there is none for this camera. */
+int lumi_response_parse(const char *text, size_t size, const char *name, const char *camera,
+                        struct lumi_response *response, struct lumi_error *error);
+/* The head, and a table after it; both to be put one behind the other. Release with lumi_free. */
+#define LUMI_RESPONSE_HEAD "lumisphere-response 1\n"
+int lumi_response_format(const struct lumi_response *response, const char *camera, char **text,
+                         struct lumi_error *error);
 
 /* A picture (3 channels) as linear light, 1.0 its white: U8 and U16 through the response, F32 as it is. */
 int lumi_response_apply(const struct lumi_response *response, const struct lumi_raster *picture,
@@ -29,7 +32,7 @@ int lumi_response_apply(const struct lumi_response *response, const struct lumi_
 /* For the estimate: the codes of one place in all shots of a bracket. */
 struct lumi_response_sample {
     uint8_t code[3];
-    int place;         /* samples with the same number are of the same light */
+    int place;          /* samples with the same number are of the same light */
     float log_exposure; /* natural logarithm */
 };
 

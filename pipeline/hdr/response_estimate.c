@@ -9,6 +9,7 @@
 #include "proto/base/memory.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #define CODES 256
@@ -98,8 +99,7 @@ static void make_monotone(double values[CODES])
         length[blocks++] = 1;
         while (blocks > 1 && mean[blocks - 2] > mean[blocks - 1]) {
             int all = length[blocks - 2] + length[blocks - 1];
-            mean[blocks - 2] =
-                (mean[blocks - 2] * length[blocks - 2] + mean[blocks - 1] * length[blocks - 1]) / all;
+            mean[blocks - 2] = (mean[blocks - 2] * length[blocks - 2] + mean[blocks - 1] * length[blocks - 1]) / all;
             length[--blocks - 1] = all;
         }
     }

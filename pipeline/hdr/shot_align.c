@@ -242,8 +242,8 @@ double lumi_shot_ratio(const struct lumi_raster *reference, const struct lumi_ra
 
     while ((long)(reference->width / step) * (reference->height / step) > RATIO_PIXELS)
         step++;
-    float *ratios = lumi_alloc((size_t)(reference->width / step + 1) * (size_t)(reference->height / step + 1),
-                               sizeof *ratios);
+    float *ratios =
+        lumi_alloc((size_t)(reference->width / step + 1) * (size_t)(reference->height / step + 1), sizeof *ratios);
     *pixels = 0;
     if (!ratios)
         return 0;

@@ -132,6 +132,20 @@ static bool choose(enum lumi_choice choice, bool by_itself)
     return choice == LUMI_CHOICE_AUTO ? by_itself : choice == LUMI_CHOICE_YES;
 }
 
+static bool wants_color(const struct lumi_run *run)
+{
+    const struct lumi_parameters *p = &run->parameters;
+    bool wanted = p->icc || p->lut || p->exposure != 0 || p->tone > LUMI_TONE_NONE;
+
+    for (int i = 0; i < 9; i++)
+        wanted = wanted || p->color_matrix[i] != 0;
+    for (int i = 0; i < 3; i++)
+        wanted = wanted || p->white_balance[i] != 0;
+    for (int i = 0; i < run->count && p->tone == LUMI_TONE_AUTO; i++)
+        wanted = wanted || run->sources[i].part_count > 0;
+    return wanted;
+}
+
 static void resolve_wants(struct lumi_run *run)
 {
     const struct lumi_parameters *p = &run->parameters;
@@ -143,6 +157,7 @@ static void resolve_wants(struct lumi_run *run)
     run->wants.equalize = choose(p->equalize, run->wants.calibrate);
     run->wants.synthesize = choose(p->synthesize, run->rig != NULL);
     run->wants.subsample = choose(p->subsample, run->rig != NULL);
+    run->wants.color = wants_color(run);
     run->wants.prefilter = p->prefilter < 0 ? run->rig != NULL : p->prefilter > 0;
 }
 

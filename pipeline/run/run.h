@@ -31,6 +31,9 @@ enum lumi_projection { LUMI_PROJECTION_AUTO = 0, LUMI_PROJECTION_EQUIANGULAR = 1
 /* Whether something is done: auto leaves it to what the capture is. */
 enum lumi_choice { LUMI_CHOICE_AUTO = 0, LUMI_CHOICE_NO = 1, LUMI_CHOICE_YES = 2 };
 
+/* How more light than a display shows is brought down to it: auto for captures with brackets only. */
+enum lumi_tone { LUMI_TONE_AUTO = 0, LUMI_TONE_NONE = 1, LUMI_TONE_REINHARD = 2, LUMI_TONE_HABLE = 3 };
+
 /* Parameters of all stages; lumi_run_defaults fills them. A stage's key covers only those it names. */
 struct lumi_parameters {
     /* which stages there are */
@@ -39,6 +42,14 @@ struct lumi_parameters {
     enum lumi_choice synthesize; /* auto: a rig that turns took it */
     enum lumi_choice subsample;  /* auto: as synthesize */
     int prefilter;               /* samples a pixel, 0: none; −1: auto, as synthesize, the stage's own number */
+    /* merge; NULL: an sRGB response */
+    const char *response; /* "srgb", "linear", "estimate" or a file; the caller's */
+    /* color; NULL, all zero: nothing is changed */
+    const char *icc, *lut; /* files, the caller's */
+    double color_matrix[9];
+    double exposure;         /* stops */
+    double white_balance[3]; /* factors */
+    enum lumi_tone tone;
     /* equiangular */
     enum lumi_projection projection; /* auto: rectilinear pinholes under 75° keep their pixels, others equiangular */
     double fov_x, fov_y;             /* radians, 0: from the source */
@@ -81,8 +92,9 @@ struct lumi_source {
     double turn_angle, drop;
     double exposure_s, iso, exposure_offset; /* as in struct lumi_source_part */
     enum lumi_pose_source pose_source;
-    struct lumi_pose prior;         /* the capture's pose, whatever calibration says */
-    int part_count;                 /* of a bracket, 2 and more, darkest first as asked for; 0: none */
+    struct lumi_pose prior; /* the capture's pose, whatever calibration says */
+    int part_count;         /* of a bracket, darkest first as asked for, 1 where the rest of it is not there; 0: the
+                               capture has no brackets */
     struct lumi_source_part *parts; /* owned */
     /* Once the run is placed; until then kept is true, the others false. */
     bool synthetic, masked, kept; /* as in struct lumi_place */

@@ -129,6 +129,23 @@ static void join_brackets(struct lumi_run *run, const int64_t *positions)
     run->count = kept;
 }
 
+/* Where there are brackets, what is left of one is one too: it was exposed by another exposure than the rest. */
+static void mend_brackets(struct lumi_run *run)
+{
+    bool any = false;
+
+    for (int i = 0; i < run->count; i++)
+        any = any || run->sources[i].part_count > 0;
+    for (int i = 0; any && i < run->count; i++) {
+        struct lumi_source *source = &run->sources[i];
+        if (source->part_count > 0)
+            continue;
+        source->parts = g_new(struct lumi_source_part, 1);
+        source->parts[0] = part_of(source);
+        source->part_count = 1;
+    }
+}
+
 void sources_free(struct lumi_source *source)
 {
     g_free(source->path);
@@ -182,8 +199,10 @@ static int load_frames(struct lumi_run *run, struct loading *loading, struct lum
     if (code == LUMI_OK && run->count == 0)
         code = lumi_fail(error, LUMI_ERR_FORMAT, "%s: %s", run->capture,
                          count ? "none of its frames has a pose" : "it holds no frame");
-    if (code == LUMI_OK)
+    if (code == LUMI_OK) {
         join_brackets(run, positions);
+        mend_brackets(run);
+    }
     return code;
 }
 
