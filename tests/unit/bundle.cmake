@@ -1,0 +1,1 @@
+lumi_test(test_bundle FOLDERS calibrate mechanism LABELS slow)
