@@ -123,6 +123,7 @@ int process_options_read(struct lumi_parameters *parameters, struct lumi_error *
     LUMI_TRY(cli_check_threads(o->threads, error));
     LUMI_TRY(read_names(parameters, error));
     LUMI_TRY(read_stages(parameters, error));
+    LUMI_TRY(color_options_read(parameters, error));
     LUMI_TRY(read_numbers(parameters, error));
     if (o->quality != NOT_GIVEN) {
         LUMI_TRY(check_range("--quality", o->quality, 0, 100, error));

@@ -2,6 +2,7 @@
 #ifndef LUMI_CLI_PROCESS_OPTIONS_H
 #define LUMI_CLI_PROCESS_OPTIONS_H
 
+#include "cli/color_options.h"
 #include "cli/command.h"
 #include "pipeline/run/run.h"
 
@@ -36,7 +37,8 @@ extern struct process_options process_options;
     {"kernel", 0, 0, G_OPTION_ARG_STRING, &process_options.kernel, "linear, gaussian or cubic (linear)", "NAME"},       \
     {"quality", 'q', 0, G_OPTION_ARG_INT, &process_options.quality, "of the images, 0 to 100 (70)", "N"},               \
     {"target-bytes", 0, 0, G_OPTION_ARG_INT64, &process_options.target_bytes, "finds the quality for a file of this size", "N"}, \
-    {"cluster", 0, 0, G_OPTION_ARG_INT, &process_options.cluster, "images a reference image (25)", "N"}
+    {"cluster", 0, 0, G_OPTION_ARG_INT, &process_options.cluster, "images a reference image (25)", "N"},      \
+    COLOR_OPTIONS
 /* clang-format on */
 
 /* Checks them and fills the parameters. */

@@ -1,6 +1,7 @@
 /* The stages as a graph: equiangular → match → depth → geometry and geometry-coarse → compress. */
 #include "pipeline/graph/graph.h"
 
+#include "pipeline/color/color_stage.h"
 #include "pipeline/compress/compress.h"
 #include "pipeline/depth/depth.h"
 #include "pipeline/equiangular/equiangular.h"
@@ -15,9 +16,17 @@
 #include <string.h>
 
 const struct lumi_stage *const lumi_stages[] = {
-    &lumi_stage_response,        &lumi_stage_merge,    &lumi_stage_equiangular,
-    &lumi_stage_match,           &lumi_stage_depth,    &lumi_stage_geometry,
-    &lumi_stage_geometry_coarse, &lumi_stage_compress, NULL,
+    &lumi_stage_response,
+    &lumi_stage_merge,
+    &lumi_stage_equiangular,
+    &lumi_stage_match,
+    &lumi_stage_depth,
+    &lumi_stage_geometry,
+    &lumi_stage_geometry_coarse,
+    &lumi_stage_grade,
+    &lumi_stage_color,
+    &lumi_stage_compress,
+    NULL,
 };
 
 const struct lumi_stage *lumi_stage_by_name(const char *name)
