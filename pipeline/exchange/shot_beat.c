@@ -2,6 +2,7 @@
 #include "pipeline/exchange/shot_match_priv.h"
 
 #include <math.h>
+#include <stdint.h>
 
 #define MISSING 0.9   /* a shot that no camera has */
 #define OUTSIDE 0.8   /* an event before or behind the sweep that all cameras took part in */

@@ -9,6 +9,7 @@
 #define CANDIDATES 24   /* offsets that are looked at closely */
 #define DRIFT_MAX 1e-3  /* no camera's clock is worse */
 #define ROUNDS 6        /* of a fit */
+#define STEPS 256       /* of climbing, at most */
 #define SAME_SCORE 0.75 /* items: scores nearer to each other than this say nothing */
 
 static int by_value(const void *a, const void *b)
@@ -158,7 +159,29 @@ static bool better(const struct fit *a, const struct fit *b, double begin, doubl
         return a->score > b->score;
     if ((fabs(a->offset) < least / 2) != (fabs(b->offset) < least / 2))
         return fabs(a->offset) < least / 2;
-    return fabs(a->first - begin) < fabs(b->first - begin);
+    return fabs(a->first - begin) < fabs(b->first - begin) - least / 2;
+}
+
+/* Shots lie evenly: from a good offset to the best it is a number of whole beats, and each is as good as the one before
+ * until the lists lie over each other. */
+static struct fit climb(const struct shot_track *reference, const struct shot_track *track, double tolerance,
+                        const struct shot_beat *beat, struct fit best)
+{
+    int longest = MAX(reference->count, track->count) / beat->bracket + 1;
+
+    for (int beats = 1, steps = 0; beats <= longest && steps < STEPS; steps++) {
+        bool found = false;
+        for (int way = -1; way <= 1; way += 2) {
+            struct fit fit = {.offset = best.offset + way * beats * beat->period, .drift = best.drift};
+            refine(reference, track, tolerance, &fit);
+            if (better(&fit, &best, reference->times[0], beat->least)) {
+                best = fit;
+                found = true;
+            }
+        }
+        beats = found ? 1 : beats * 2;
+    }
+    return best;
 }
 
 static void align(const struct shot_track *reference, struct shot_track *track, const struct shot_beat *beat)
@@ -177,12 +200,16 @@ static void align(const struct shot_track *reference, struct shot_track *track, 
         if (count == 0 || better(&fits[count], &best, begin, beat->least))
             best = fits[count];
     }
+    best = climb(reference, track, tolerance, beat, best);
     track->offset = best.offset;
     track->drift = best.drift;
-    for (int i = 0; i < count; i++)
-        if (fabs(fits[i].score - best.score) <= SAME_SCORE && fabs(fits[i].offset - best.offset) > beat->least / 2 &&
+    for (int way = -1; way <= 1; way += 2) {
+        struct fit fit = {.offset = best.offset + way * beat->period, .drift = best.drift};
+        refine(reference, track, tolerance, &fit);
+        if (fabs(fit.score - best.score) <= SAME_SCORE && fabs(fit.offset - best.offset) > beat->least / 2 &&
             fabs(best.offset) >= beat->least / 2)
             track->ambiguous = true;
+    }
 }
 
 void shot_align_clocks(struct shot_track *tracks, int count, int reference, const struct shot_beat *beat)

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #define FINE 0.01 /* s, of a clock that tells parts of seconds */
+#define LINE 0.1  /* s, of times that a steady pace stands for */
 #define SAME 0.17 /* stops: exposures that are meant to be one */
 #define JOIN 0.35 /* of the least time between two shots: pictures of one moment */
 #define ITEMS_MAX 65536
@@ -177,9 +178,28 @@ static void fill_times(struct shot_track *track)
     }
 }
 
-/* Pictures of one whole second lie evenly in it. */
+/* Whole seconds that a steady pace explains are replaced by it: the line through them, where each lies within its
+ * second. Otherwise pictures of one second lie evenly in it. */
 static void spread_seconds(struct shot_track *track)
 {
+    double middle = (track->count - 1) / 2.0, mean = 0, slope = 0, squares = 0;
+    bool steady = track->count > 8;
+
+    for (int i = 0; i < track->count; i++)
+        mean += (track->times[i] + 0.5) / track->count;
+    for (int i = 0; i < track->count; i++) {
+        slope += (i - middle) * (track->times[i] + 0.5 - mean);
+        squares += (i - middle) * (i - middle);
+    }
+    slope /= fmax(squares, 1);
+    for (int i = 0; i < track->count; i++)
+        steady = steady && fabs(mean + slope * (i - middle) - track->times[i] - 0.5) < 0.75;
+    for (int i = 0; steady && i < track->count; i++)
+        track->times[i] = mean + slope * (i - middle);
+    if (steady) {
+        track->resolution = LINE;
+        return;
+    }
     for (int i = 0; i < track->count;) {
         int same = i;
         while (same < track->count && track->times[same] == track->times[i])
@@ -209,6 +229,7 @@ static void init_track(struct shot_track *track, const struct lumi_shot_camera *
         return;
     if (whole == known && known > 3) {
         track->resolution = 1;
+        fill_times(track);
         spread_seconds(track);
     }
     fill_times(track);
