@@ -4,7 +4,7 @@
 
 #include "cli/rig_files.h"
 #include "pipeline/exchange/exchange.h"
-#include "pipeline/exchange/ingest.h"
+#include "pipeline/exchange/recordings.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -3,7 +3,7 @@
 #define LUMI_PIPELINE_EXCHANGE_INGEST_PRIV_H
 
 #include "pipeline/exchange/card.h"
-#include "pipeline/exchange/ingest.h"
+#include "pipeline/exchange/recordings.h"
 #include "pipeline/exchange/shot_match.h"
 #include "proto/capture/capture.h"
 

@@ -2,8 +2,8 @@
  * capture with the poses that the rig's mechanism tells. What is missing, too much or damaged is found, said in a line
  * each and kept in the capture as incidents; the rest is imported. docs/import-export.md, "Cameras that record by
  * themselves". */
-#ifndef LUMI_PIPELINE_EXCHANGE_INGEST_H
-#define LUMI_PIPELINE_EXCHANGE_INGEST_H
+#ifndef LUMI_PIPELINE_EXCHANGE_RECORDINGS_H
+#define LUMI_PIPELINE_EXCHANGE_RECORDINGS_H
 
 #include "proto/base/result.h"
 #include "proto/mechanism/sweep_plan.h"

@@ -1,5 +1,5 @@
 /* An import of cameras' own recordings: which camera's is what, and the steps in order. */
-#include "pipeline/exchange/ingest.h"
+#include "pipeline/exchange/recordings.h"
 
 #include "pipeline/exchange/ingest_priv.h"
 
