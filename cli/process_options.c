@@ -9,7 +9,8 @@
 
 #define NOT_GIVEN (-1000000)
 
-struct process_options process_options = {.pixels_per_degree = NOT_GIVEN,
+struct process_options process_options = {.density = NOT_GIVEN,
+                                          .pixels_per_degree = NOT_GIVEN,
                                           .near_m = NOT_GIVEN,
                                           .far_m = NOT_GIVEN,
                                           .gp = NOT_GIVEN,
@@ -73,6 +74,14 @@ static int read_stages(struct lumi_parameters *parameters, struct lumi_error *er
         LUMI_TRY(check_range("--prefilter", parameters->prefilter, 0, 65536, error));
     } else if (o->prefilter) {
         parameters->prefilter = -1;
+    }
+    if (o->density != NOT_GIVEN) {
+        LUMI_TRY(check_range("--density", o->density, 0.01, 100, error));
+        parameters->density = o->density;
+    }
+    if (o->stand && strcmp(o->stand, "auto") != 0) {
+        LUMI_TRY(cli_parse_doubles("--stand", o->stand, ',', 1, &parameters->stand_m, error));
+        LUMI_TRY(check_range("--stand", parameters->stand_m, 0, 10, error));
     }
     return LUMI_OK;
 }

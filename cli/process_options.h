@@ -9,8 +9,8 @@
 /* Values that the option tables of both commands write to. */
 struct process_options {
     char *work, *projection, *fov, *shape, *kernel;
-    char *calibrate, *equalize, *synthesize, *subsample, *prefilter; /* which stages there are */
-    double pixels_per_degree, near_m, far_m, gp, disk_scale;
+    char *calibrate, *equalize, *synthesize, *subsample, *prefilter, *stand; /* which stages there are */
+    double density, pixels_per_degree, near_m, far_m, gp, disk_scale;
     int neighbours, quality, cluster, threads;
     gint64 target_bytes;
 };
@@ -24,6 +24,8 @@ extern struct process_options process_options;
     {"equalize", 0, 0, G_OPTION_ARG_STRING, &process_options.equalize, "even out exposure and vignetting between cameras: auto, no, yes", "WHETHER"}, \
     {"synthesize", 0, 0, G_OPTION_ARG_STRING, &process_options.synthesize, "views for the poles, and the stand filled in: auto, no, yes", "WHETHER"}, \
     {"subsample", 0, 0, G_OPTION_ARG_STRING, &process_options.subsample, "thin out views where they are dense: auto, no, yes", "WHETHER"}, \
+    {"density", 0, 0, G_OPTION_ARG_DOUBLE, &process_options.density, "views kept, as a share of the equator's density (1)", "SHARE"}, \
+    {"stand", 0, 0, G_OPTION_ARG_STRING, &process_options.stand, "how far the feet of the rig's stand are from its axis: auto, metres, or 0 for none", "METRES"}, \
     {"prefilter", 0, 0, G_OPTION_ARG_STRING, &process_options.prefilter, "samples a pixel of the prefilter, auto, or 0 for none", "N"}, \
     {"projection", 0, 0, G_OPTION_ARG_STRING, &process_options.projection, "auto, equiangular or rectilinear views (auto)", "NAME"}, \
     {"fov", 0, 0, G_OPTION_ARG_STRING, &process_options.fov, "field of view of the views, degrees (from the lens)", "XxY"}, \

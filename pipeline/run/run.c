@@ -26,6 +26,8 @@ void lumi_run_defaults(struct lumi_parameters *parameters)
                                            .synthesize = LUMI_CHOICE_NO,
                                            .subsample = LUMI_CHOICE_NO,
                                            .prefilter = 0,
+                                           .density = 1,
+                                           .stand_m = -1,
                                            .geometry_precision = 5,
                                            .disk_scale = 1,
                                            .disk_shape = LUMI_DISK_OVAL,

@@ -42,6 +42,9 @@ struct lumi_parameters {
     enum lumi_choice synthesize; /* auto: a rig that turns took it */
     enum lumi_choice subsample;  /* auto: as synthesize */
     int prefilter;               /* samples a pixel, 0: none; −1: auto, as synthesize, the stage's own number */
+    /* subsample, synthesize */
+    double density; /* views an area that are kept, as a share of the equator's */
+    double stand_m; /* how far the stand's feet are from the axis; 0: none; −1: found */
     /* merge; NULL: an sRGB response */
     const char *response; /* "srgb", "linear", "estimate" or a file; the caller's */
     /* color; NULL, all zero: nothing is changed */

@@ -34,8 +34,8 @@ double lumi_pole_gap(int count, const struct lumi_vec3 *points, struct lumi_vec3
 static void look(struct lumi_vec3 centre, double radius, double angle, double azimuth, bool bottom, bool inward,
                  struct lumi_pose *pose)
 {
-    const struct lumi_vec3 out = lumi_vec3(sin(angle) * cos(azimuth), sin(angle) * sin(azimuth),
-                                           bottom ? -cos(angle) : cos(angle));
+    const struct lumi_vec3 out =
+        lumi_vec3(sin(angle) * cos(azimuth), sin(angle) * sin(azimuth), bottom ? -cos(angle) : cos(angle));
 
     lumi_pose_look(lumi_add(centre, lumi_scale(out, radius)), inward ? lumi_scale(out, -1) : out, lumi_vec3(0, 0, 1),
                    pose);

@@ -122,15 +122,13 @@ void lumi_spread_keep(int count, const struct lumi_vec3 *points, struct lumi_vec
         turns[i] = (struct turn){fabs(row), row, atan2(out.y, out.x), points[i], i};
     }
     qsort(turns, (size_t)count, sizeof *turns, compare_turns);
-    memset(kept, 0, (size_t)count * sizeof *kept);
     for (int i = 0; i < count; i++) {
         const struct frame frame = frame_at(turns[i].point, centre);
         bool near = false;
         for (int k = 0; k < listed && !near && east > 0 && north > 0; k++)
             near = too_near(&frame, lumi_sub(list[k], turns[i].point), east, north);
-        if (!near) {
-            kept[turns[i].index] = true;
+        kept[turns[i].index] = !near;
+        if (!near)
             list[listed++] = turns[i].point;
-        }
     }
 }

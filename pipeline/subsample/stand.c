@@ -6,10 +6,8 @@ bool lumi_stand_place(struct lumi_vec3 centre, double sphere, double gap, double
 {
     const double hole = sphere * sin(gap);
 
-    *stand = (struct lumi_stand){.centre = centre,
-                                 .top = centre.z - sphere,
-                                 .bottom = floor,
-                                 .wide = radius > 0 ? radius : LUMI_STAND_RADIUS};
+    *stand = (struct lumi_stand){
+        .centre = centre, .top = centre.z - sphere, .bottom = floor, .wide = radius > 0 ? radius : LUMI_STAND_RADIUS};
     /* Cameras go round it: what stands in the hole is narrower than that. */
     stand->narrow = fmin(0.9 * hole, stand->wide);
     return hole > 0 && stand->bottom < stand->top;

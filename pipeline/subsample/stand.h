@@ -13,9 +13,9 @@
 #define LUMI_STAND_REACH 4.0
 
 struct lumi_stand {
-    struct lumi_vec3 centre;    /* of the rig's sphere */
-    double top, bottom;         /* heights: from where it widens, and where it ends (the floor) */
-    double narrow, wide;        /* radius at and above `top`, and at `bottom` */
+    struct lumi_vec3 centre; /* of the rig's sphere */
+    double top, bottom;      /* heights: from where it widens, and where it ends (the floor) */
+    double narrow, wide;     /* radius at and above `top`, and at `bottom` */
 };
 
 /* `gap`: of the lower pole (lumi_pole_gap); `radius` at the floor, metres, ≤ 0: LUMI_STAND_RADIUS; `floor`: its height.
