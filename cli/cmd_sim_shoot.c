@@ -1,11 +1,13 @@
 /* lumi sim shoot: a capture of a simulated place. */
 #include "cli/command.h"
+#include "sim/errors.h"
 #include "sim/place.h"
 #include "sim/shoot.h"
 
 #include <math.h>
 
 static char *out, *rig_text, *size_text, *format_text, *lens_text, *depth_dir;
+static char *pose_error, *mechanism_error, *truth_poses, *truth_capture;
 static int threads, bits, seed = 1;
 static double fov, scale = 1, turned, exposure, vignetting, full_well, read_noise;
 static gboolean inward;
@@ -26,6 +28,18 @@ static const GOptionEntry options[] = {
      "png (default), jpeg, exr (linear light) or dng (what a sensor says behind its colour filter)", "FORMAT"},
     {"truth-depth", 0, 0, G_OPTION_ARG_FILENAME, &depth_dir, "also writes every frame's true depth there, NAME.exr",
      "DIR"},
+    {"pose-error", 0, 0, G_OPTION_ARG_STRING, &pose_error,
+     "every camera is beside its place: standard deviations along and about each axis, as 5,0.5; the capture's poses "
+     "are the rig's, priors",
+     "MM,DEGREES"},
+    {"mechanism-error", 0, 0, G_OPTION_ARG_STRING, &mechanism_error,
+     "the rig is not what its profile says: yes, or a list of axis, wobble, arm, drop, backlash, pan, tilt, roll "
+     "(degrees), centre, radius (mm), as axis=0.3,radius=4",
+     "LIST"},
+    {"truth-poses", 0, 0, G_OPTION_ARG_FILENAME, &truth_poses, "also writes every frame's true pose, a transforms.json",
+     "FILE"},
+    {"truth-capture", 0, 0, G_OPTION_ARG_FILENAME, &truth_capture,
+     "also makes a second capture: the same pictures with their true poses", "CAPTURE"},
     {"turned", 0, 0, G_OPTION_ARG_DOUBLE, &turned,
      "degrees that the rig turns during every exposure: motion blur about the true pose (0)", "DEGREES"},
     {"exposure", 0, 0, G_OPTION_ARG_DOUBLE, &exposure, "stops (0)", "STOPS"},
@@ -34,7 +48,7 @@ static const GOptionEntry options[] = {
     {"read-noise", 0, 0, G_OPTION_ARG_DOUBLE, &read_noise, "electrons, one standard deviation (0)", "ELECTRONS"},
     {"bits", 0, 0, G_OPTION_ARG_INT, &bits, "of the linear converter: 8, 10 or 12 (none); 10 and 12 give 16-bit PNG",
      "BITS"},
-    {"seed", 0, 0, G_OPTION_ARG_INT, &seed, "of the noise (1)", "S"},
+    {"seed", 0, 0, G_OPTION_ARG_INT, &seed, "of noise and errors (1)", "S"},
     {"threads", 'j', 0, G_OPTION_ARG_INT, &threads, "threads (all)", "N"},
     {0},
 };
@@ -81,12 +95,30 @@ static int parse(struct sim_rig_options *rig, struct sim_output *output, struct 
     return sim_sensor_check(&output->sensor, error);
 }
 
+static int make_errors(struct sim_rig *rig, struct sim_output *output, struct lumi_error *error)
+{
+    struct sim_errors errors = {.seed = (uint64_t)seed};
+    double numbers[2] = {0, 0};
+
+    if (pose_error)
+        LUMI_TRY(cli_parse_doubles("--pose-error", pose_error, ',', 2, numbers, error));
+    if (mechanism_error)
+        LUMI_TRY(sim_errors_parse(mechanism_error, &errors.mechanism, error));
+    if (!pose_error && !mechanism_error)
+        return LUMI_OK;
+    errors.position_m = numbers[0] / 1000;
+    errors.rotation = numbers[1] * LUMI_PI / 180;
+    output->given_poses = true;
+    return sim_errors_apply(&errors, rig, error);
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     struct sim_rig_options rig_options;
     struct sim_scene *scene = NULL;
     struct sim_output output;
     struct sim_rig rig = {0};
+    const struct sim_shoot_truth truth = {truth_poses, truth_capture};
     int code;
 
     (void)argc;
@@ -100,8 +132,9 @@ static int run(int argc, char **argv, struct lumi_error *error)
         goto done;
     }
     output.profile = &rig.profile;
+    LUMI_GOTO(code, done, make_errors(&rig, &output, error));
     LUMI_GOTO(code, done, sim_place_open(argv[0], &scene, error));
-    LUMI_GOTO(code, done, sim_shoot(scene, argv[0], &rig, &output, out, error));
+    LUMI_GOTO(code, done, sim_shoot(scene, argv[0], &rig, &output, &truth, out, error));
 done:
     sim_scene_destroy(scene);
     sim_rig_finish(&rig);

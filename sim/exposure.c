@@ -33,6 +33,15 @@ static void turn_aside(struct lumi_pose *pose, double askew)
     }
 }
 
+/* The middle's pose, turned about the world's axis. */
+static void turn_about_axis(const struct lumi_pose *middle, double angle, struct lumi_pose *pose)
+{
+    const double c = cos(angle), s = sin(angle);
+    const struct lumi_pose turn = {{c, -s, 0, s, c, 0, 0, 0, 1}, {0, 0, 0}};
+
+    lumi_pose_multiply(&turn, middle, pose);
+}
+
 int sim_exposure_render(const struct sim_scene *scene, const struct lumi_rig *rig, int camera,
                         const struct sim_moment *moment, int threads, struct lumi_raster *picture,
                         struct lumi_error *error)
@@ -42,11 +51,14 @@ int sim_exposure_render(const struct sim_scene *scene, const struct lumi_rig *ri
     int code = LUMI_OK;
 
     for (int i = 0; i < steps && code == LUMI_OK; i++) {
-        const double angle = moment->angle + moment->moved * ((i + 0.5) / steps - 0.5);
+        const double moved = moment->moved * ((i + 0.5) / steps - 0.5);
         struct lumi_raster one = {0};
         struct lumi_pose pose;
 
-        lumi_rig_camera_pose_at(rig, camera, angle, moment->drop, &pose);
+        if (moment->pose)
+            turn_about_axis(moment->pose, moved, &pose);
+        else
+            lumi_rig_camera_pose_at(rig, camera, moment->angle + moved, moment->drop, &pose);
         turn_aside(&pose, moment->askew);
         code = sim_camera_render(scene, lens, &pose, threads, &one, NULL, error);
         if (code == LUMI_OK && steps > 1) {

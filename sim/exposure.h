@@ -7,9 +7,10 @@
 #include "sim/scene.h"
 
 struct sim_moment {
-    double angle, drop; /* of platform and arm at the exposure's middle, radians */
-    double moved;       /* radians that the platform turns meanwhile; 0: it stands */
-    double askew;       /* radians that somebody has turned the camera aside, to its right */
+    double angle, drop;           /* of platform and arm at the exposure's middle, radians */
+    double moved;                 /* radians that the platform turns meanwhile; 0: it stands */
+    double askew;                 /* radians that somebody has turned the camera aside, to its right */
+    const struct lumi_pose *pose; /* of the camera at the exposure's middle, where it is not what the rig says; NULL */
 };
 
 /* Linear RGB, F32, created here: the mean of what is seen on the way, at most nine pictures, one for every half pixel

@@ -27,11 +27,12 @@ void sim_rig_options_init(struct sim_rig_options *options);
 
 struct sim_view {
     struct lumi_lens lens;
-    struct lumi_pose pose;
+    struct lumi_pose pose;  /* the true one */
+    struct lumi_pose prior; /* what the rig believes; of rigs that are `shaken` only */
     int row, column;
     int camera, position, turn; /* of the rig; 0, the number and 0 where there is no mechanism */
     int64_t step;
-    double turn_angle, drop;
+    double turn_angle, drop; /* as the rig believes */
 };
 
 struct sim_rig {
@@ -42,6 +43,7 @@ struct sim_rig {
     double radius;         /* of the sphere, or half of the plane's smaller side */
     double half_x, half_z; /* of the plane */
     bool inward;
+    bool shaken; /* views have priors (sim/errors.h) */
     struct lumi_rig profile;
 };
 

@@ -97,7 +97,8 @@ done:
 static int render(const struct sim_scene *scene, const struct sim_view *view, const struct sim_output *output,
                   struct lumi_raster *color, struct lumi_raster *depth, struct lumi_error *error)
 {
-    const struct sim_moment moment = {view->turn_angle, view->drop, output->turned, 0};
+    const struct sim_moment moment = {view->turn_angle, view->drop, output->turned, 0,
+                                      output->given_poses ? &view->pose : NULL};
 
     if (output->turned == 0)
         return sim_camera_render(scene, &view->lens, &view->pose, output->threads, color, depth, error);
@@ -202,11 +203,14 @@ struct places {
     char *images, *depths;
 };
 
+char *sim_frame_name(const struct sim_view *view)
+{
+    return g_strdup_printf("r%02dc%02d", view->row, view->column);
+}
+
 static char *view_name(const struct sim_rig *views, int index)
 {
-    const struct sim_view *view = &views->views[index];
-
-    return views->rows > 1 ? g_strdup_printf("r%02dc%02d", view->row, view->column) : g_strdup_printf("v%04d", index);
+    return views->rows > 1 ? sim_frame_name(&views->views[index]) : g_strdup_printf("v%04d", index);
 }
 
 static void view_paths(const struct places *places, const struct sim_output *output, const char *name, char **image,
@@ -253,6 +257,20 @@ static void remove_views(const struct sim_rig *views, const struct sim_output *o
     rmdir(places->images);
     rmdir(places->depths);
     rmdir(dir);
+}
+
+int sim_truth_poses(const struct sim_rig *views, enum sim_format format, const char *path, struct lumi_error *error)
+{
+    g_autoptr(GString) json = g_string_new("{\"frames\": [\n");
+    const struct sim_output output = {.format = format};
+
+    for (int i = 0; i < views->count; i++) {
+        g_autofree char *name = sim_frame_name(&views->views[i]);
+        append_frame(json, &views->views[i], name, &output);
+        g_string_append(json, i + 1 < views->count ? ",\n" : "\n");
+    }
+    g_string_append(json, "]}\n");
+    return lumi_file_write(path, json->str, json->len, false, error);
 }
 
 int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,

@@ -20,6 +20,7 @@ struct sim_output {
     struct sim_sensor sensor;
     const struct lumi_rig *profile; /* of the views, where `turned` is set */
     double turned;                  /* radians that the platform turns during an exposure */
+    bool given_poses;               /* with `turned`: about the views' own poses, which are not what the profile says */
     int threads;                    /* 0: as many as there are */
     const char *depth_dir;          /* where depth maps go; NULL: none (truth: its own folder when `depth` is set) */
     bool depth;
@@ -32,6 +33,10 @@ void sim_output_init(struct sim_output *output);
 /* Renders all of `views` into the folder `dir`, transforms.json last. */
 int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, const struct sim_output *output,
                     const char *dir, struct lumi_error *error);
+
+/* transforms.json alone: the true poses of a capture's frames, by the names they have there ("r00c00"). */
+int sim_truth_poses(const struct sim_rig *views, enum sim_format format, const char *path, struct lumi_error *error);
+char *sim_frame_name(const struct sim_view *view); /* g_free */
 
 /* One view as the bytes of a picture file; `index` is the frame's number for the sensor. Release *data with lumi_free.
  * If depth_path is not NULL the depth map is written there. */

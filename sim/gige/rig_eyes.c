@@ -60,7 +60,7 @@ static int picture(void *context, int index, const struct sim_gige_exposure *exp
                    struct lumi_error *error)
 {
     const struct eyes *e = context;
-    const struct sim_moment moment = {exposure->angle, exposure->drop, exposure->moved, exposure->askew};
+    const struct sim_moment moment = {exposure->angle, exposure->drop, exposure->moved, exposure->askew, NULL};
 
     return sim_exposure_render(e->scene, &e->setup->rig->rig, e->setup->first + index, &moment, THREADS, raster, error);
 }

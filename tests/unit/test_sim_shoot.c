@@ -73,8 +73,8 @@ static void a_capture_holds_every_frame_with_its_true_pose(void **state)
         sim_output_init(&output);
         output.depth_dir = depth;
         output.threads = 2;
-        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, path, &error), LUMI_OK);
-        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, path, &error), LUMI_ERR_EXISTS);
+        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, NULL, path, &error), LUMI_OK);
+        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, NULL, path, &error), LUMI_ERR_EXISTS);
         assert_int_equal(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, &error), LUMI_OK);
         assert_int_equal(lumi_capture_get_meta(capture, "surface", meta, sizeof meta, &error), LUMI_OK);
         assert_string_equal(meta, k ? "sphere" : "plane");
