@@ -10,6 +10,7 @@
 #include "pipeline/geometry/geometry.h"
 #include "pipeline/graph/deliver.h"
 #include "pipeline/hdr/merge_stage.h"
+#include "pipeline/prefilter/prefilter.h"
 #include "pipeline/subsample/subsample.h"
 #include "proto/base/file.h"
 
@@ -17,9 +18,19 @@
 #include <string.h>
 
 const struct lumi_stage *const lumi_stages[] = {
-    &lumi_stage_response, &lumi_stage_merge, &lumi_stage_subsample, &lumi_stage_equiangular,
-    &lumi_stage_match,    &lumi_stage_depth, &lumi_stage_geometry,  &lumi_stage_geometry_coarse,
-    &lumi_stage_grade,    &lumi_stage_color, &lumi_stage_compress,  NULL,
+    &lumi_stage_response,
+    &lumi_stage_merge,
+    &lumi_stage_subsample,
+    &lumi_stage_equiangular,
+    &lumi_stage_match,
+    &lumi_stage_depth,
+    &lumi_stage_geometry,
+    &lumi_stage_geometry_coarse,
+    &lumi_stage_prefilter,
+    &lumi_stage_grade,
+    &lumi_stage_color,
+    &lumi_stage_compress,
+    NULL,
 };
 
 const struct lumi_stage *lumi_stage_by_name(const char *name)

@@ -1,0 +1,310 @@
+/* Rays that meet dense depth: which views a block sees, and between which depths it has to search. */
+#include "render/cpu/dense_cast_priv.h"
+
+#include "proto/base/memory.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+struct lumi_cast {
+    struct lumi_viewset *set;
+    struct cast_disk disk;
+    enum lumi_filter filter;
+    const struct cast_kernels *kernels;
+    int count, held; /* views; those acquired so far */
+    struct cast_view *views;
+    struct cast_axis *axes; /* two a different grid */
+    int axis_count;
+};
+
+struct lumi_cast_eye {
+    struct lumi_surface_view places[1]; /* one a view */
+};
+
+static void fill_axis(struct cast_axis *axis, const struct lumi_grid *grid, bool vertical)
+{
+    const double *tangents = vertical ? grid->tan_y : grid->tan_x;
+    const int tiles = vertical ? grid->rows : grid->cols;
+    const double low = tangents[0], cell = (tangents[tiles] - low) / CAST_AXIS_CELLS;
+
+    *axis = (struct cast_axis){.origin = (float)low, .scale = (float)(1 / cell)};
+    for (int i = 0; i < CAST_AXIS_CELLS; i++) {
+        double t0 = low + i * cell, t1 = t0 + cell, x0, y0, x1, y1;
+        lumi_grid_project(grid, vertical ? lumi_vec3(0, t0, 1) : lumi_vec3(t0, 0, 1), &x0, &y0);
+        lumi_grid_project(grid, vertical ? lumi_vec3(0, t1, 1) : lumi_vec3(t1, 0, 1), &x1, &y1);
+        const double p0 = vertical ? y0 : x0, p1 = vertical ? y1 : x1, slope = (p1 - p0) / cell;
+        axis->slope[i] = (float)slope;
+        axis->offset[i] = (float)(p0 - slope * t0);
+        axis->steepest = fmaxf(axis->steepest, (float)slope);
+    }
+}
+
+/* The tables of a grid, made once for all views that share it. */
+static void find_axes(struct lumi_cast *cast, int index)
+{
+    struct cast_view *view = &cast->views[index];
+
+    for (int i = 0; i < index; i++)
+        if (cast->views[i].view->grid == view->view->grid) {
+            view->x = cast->views[i].x;
+            view->y = cast->views[i].y;
+            return;
+        }
+    view->x = &cast->axes[cast->axis_count++];
+    view->y = &cast->axes[cast->axis_count++];
+    fill_axis(view->x, view->view->grid, false);
+    fill_axis(view->y, view->view->grid, true);
+}
+
+/* Lowest and highest depth of the pixels [x0, x1) × [y0, y1). */
+static void bound(const struct cast_view *view, int x0, int y0, int x1, int y1, float *lowest, float *highest)
+{
+    float low = FLT_MAX, high = 0;
+
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++) {
+            float w = view->depth[y * view->pitch + x];
+            low = w < low ? w : low;
+            high = w > high ? w : high;
+        }
+    *lowest = low;
+    *highest = high;
+}
+
+static int fill_bounds(struct cast_view *view)
+{
+    view->bound_cols = (view->width + CAST_BOUND - 1) / CAST_BOUND;
+    view->bound_rows = (view->height + CAST_BOUND - 1) / CAST_BOUND;
+    const size_t cells = (size_t)view->bound_cols * (size_t)view->bound_rows;
+    view->lowest = lumi_alloc(cells, sizeof(float));
+    view->highest = lumi_alloc(cells, sizeof(float));
+    if (!view->lowest || !view->highest)
+        return LUMI_ERR_NOMEM;
+    for (int r = 0; r < view->bound_rows; r++)
+        for (int c = 0; c < view->bound_cols; c++) {
+            int x0 = c * CAST_BOUND - 1, y0 = r * CAST_BOUND - 1, x1 = x0 + CAST_BOUND + 2, y1 = y0 + CAST_BOUND + 2;
+            const int at = r * view->bound_cols + c;
+            x0 = x0 > 0 ? x0 : 0;
+            y0 = y0 > 0 ? y0 : 0;
+            x1 = x1 < view->width ? x1 : view->width;
+            y1 = y1 < view->height ? y1 : view->height;
+            bound(view, x0, y0, x1, y1, &view->lowest[at], &view->highest[at]);
+        }
+    bound(view, 0, 0, view->width, view->height, &view->all_lowest, &view->all_highest);
+    return LUMI_OK;
+}
+
+static int prepare(struct lumi_cast *cast, int index, struct lumi_error *error)
+{
+    struct cast_view *view = &cast->views[index];
+    const struct lumi_raster *depth;
+
+    view->view = lumi_viewset_view(cast->set, index);
+    depth = view->view->inverse_depth;
+    LUMI_TRY(lumi_viewset_acquire(cast->set, index, &view->pixels, NULL, error));
+    cast->held = index + 1;
+    view->width = view->pixels.width;
+    view->height = view->pixels.height;
+    if (!depth || view->pixels.sample != LUMI_F32 || view->width < 2 || view->height < 2)
+        return lumi_fail(error, LUMI_ERR_ARG, "view %d: casting wants dense depth and floating-point pixels", index);
+    view->depth = depth->data;
+    view->pitch = (int)(depth->stride / sizeof(float));
+    find_axes(cast, index);
+    if (fill_bounds(view) != LUMI_OK)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to bound a view's depths");
+    return LUMI_OK;
+}
+
+int lumi_cast_create(struct lumi_viewset *set, const struct lumi_disk_settings *settings, struct lumi_cast **result,
+                     struct lumi_error *error)
+{
+    struct lumi_disk_settings defaults;
+    struct lumi_cast *cast = lumi_calloc(1, sizeof *cast);
+    const int count = lumi_viewset_count(set);
+    int code = LUMI_OK;
+
+    *result = NULL;
+    if (!cast)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to cast rays");
+    lumi_disk_settings_default(&defaults);
+    settings = settings ? settings : &defaults;
+    lumi_shade_tables();
+    cast->set = set;
+    cast->count = count;
+    cast->filter = settings->filter;
+    cast->kernels = cast_kernels();
+    cast->disk = (struct cast_disk){.shape = lumi_viewset_shape(set),
+                                    .kernel = settings->kernel >= 0 ? (enum lumi_disk_kernel)settings->kernel
+                                                                    : lumi_viewset_kernel(set),
+                                    .scale = settings->disk_scale,
+                                    .stretch = settings->stretch > 0 ? 1 / settings->stretch : 0};
+    cast->views = lumi_calloc((size_t)count, sizeof *cast->views);
+    cast->axes = lumi_calloc(2 * (size_t)count, sizeof *cast->axes);
+    if (!cast->views || !cast->axes)
+        code = lumi_fail(error, LUMI_ERR_NOMEM, "no memory to cast rays");
+    for (int i = 0; code == LUMI_OK && i < count; i++)
+        code = prepare(cast, i, error);
+    if (code != LUMI_OK) {
+        lumi_cast_destroy(cast);
+        return code;
+    }
+    *result = cast;
+    return LUMI_OK;
+}
+
+void lumi_cast_destroy(struct lumi_cast *cast)
+{
+    if (!cast)
+        return;
+    for (int i = 0; i < cast->held; i++) {
+        lumi_viewset_release(cast->set, i);
+        lumi_free(cast->views[i].lowest);
+        lumi_free(cast->views[i].highest);
+    }
+    lumi_free(cast->views);
+    lumi_free(cast->axes);
+    lumi_free(cast);
+}
+
+int lumi_cast_eye_create(const struct lumi_cast *cast, struct lumi_vec3 eye, struct lumi_cast_eye **result,
+                         struct lumi_error *error)
+{
+    *result = lumi_alloc((size_t)cast->count, sizeof(struct lumi_surface_view));
+    if (!*result)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory to cast rays");
+    for (int i = 0; i < cast->count; i++)
+        lumi_surface_place(&(*result)->places[i], cast->views[i].view, eye, cast->disk.scale);
+    return LUMI_OK;
+}
+
+void lumi_cast_eye_destroy(struct lumi_cast_eye *eye)
+{
+    lumi_free(eye);
+}
+
+/* What a cell's rays have in common about a view. */
+struct reach {
+    float ax[2], ay[2], u[2], v[2];
+};
+
+static void widen(float range[2], float value)
+{
+    range[0] = value < range[0] ? value : range[0];
+    range[1] = value > range[1] ? value : range[1];
+}
+
+static void reach_of(const struct cast_cell *cell, struct reach *reach)
+{
+    *reach = (struct reach){{FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}};
+    for (int i = 0; i < LUMI_CELL_PIXELS; i++) {
+        if (!(cell->weight[i] > 0))
+            continue;
+        widen(reach->ax, cell->ax[i]);
+        widen(reach->ay, cell->ay[i]);
+        widen(reach->u, cell->u[i]);
+        widen(reach->v, cell->v[i]);
+    }
+}
+
+static float pixel_of(const struct cast_axis *axis, float tangent)
+{
+    float at = fminf(fmaxf((tangent - axis->origin) * axis->scale, 0), CAST_AXIS_CELLS - 1);
+
+    return axis->offset[(int)at] + axis->slope[(int)at] * tangent;
+}
+
+/* The cells of bounds that tangents a + w · b, w in [lo, hi], can fall into; false where they miss the image. */
+static bool bound_range(const struct cast_axis *axis, const float a[2], const float b[2], float lo, float hi, int size,
+                        int range[2])
+{
+    float low = a[0] + fminf(lo * b[0], hi * b[0]), high = a[1] + fmaxf(lo * b[1], hi * b[1]);
+    float first = pixel_of(axis, low), last = pixel_of(axis, high);
+
+    if (last < 0 || first > (float)size)
+        return false;
+    first = fminf(fmaxf(first, 0), (float)size - 1);
+    last = fminf(fmaxf(last, 0), (float)size - 1);
+    range[0] = (int)first / CAST_BOUND;
+    range[1] = (int)last / CAST_BOUND;
+    return true;
+}
+
+/* Narrows what is to be searched by the depths of the pixels that can be met; false where none can. */
+static bool narrow(const struct cast_view *view, const struct reach *reach, float nearest, struct cast_search *search)
+{
+    search->lo = fminf(view->all_lowest, nearest);
+    search->hi = fminf(view->all_highest, nearest);
+    for (int round = 0; round < 4; round++) {
+        int cols[2], rows[2];
+        if (!bound_range(view->x, reach->ax, reach->u, search->lo, search->hi, view->width, cols) ||
+            !bound_range(view->y, reach->ay, reach->v, search->lo, search->hi, view->height, rows))
+            return false;
+        float lo = FLT_MAX, hi = 0;
+        for (int r = rows[0]; r <= rows[1]; r++)
+            for (int c = cols[0]; c <= cols[1]; c++) {
+                lo = fminf(lo, view->lowest[r * view->bound_cols + c]);
+                hi = fmaxf(hi, view->highest[r * view->bound_cols + c]);
+            }
+        lo = fmaxf(lo, search->lo);
+        hi = fmaxf(fminf(hi, search->hi), lo);
+        if (lo == search->lo && hi == search->hi)
+            break;
+        search->lo = lo;
+        search->hi = hi;
+    }
+    return true;
+}
+
+static void count_steps(const struct cast_view *view, const struct reach *reach, struct cast_search *search)
+{
+    const float u = fmaxf(fabsf(reach->u[0]), fabsf(reach->u[1])), v = fmaxf(fabsf(reach->v[0]), fabsf(reach->v[1]));
+    const float way = (search->hi - search->lo) * fmaxf(u * view->x->steepest, v * view->y->steepest);
+
+    search->steps = way <= 1 ? 0 : (int)fminf(ceilf(way), CAST_STEPS_MAX);
+}
+
+/* The least cone, as lumi_cone_around's but of a sum in eight parts. */
+static struct lumi_cone block_cone(const float *x, const float *y, const float *z)
+{
+    return lumi_cone_around(x, y, z, LUMI_BLOCK_PIXELS, 1);
+}
+
+static void cast_cell(const struct lumi_cast *cast, const struct cast_view *view, const struct lumi_surface_view *place,
+                      const float *x, const float *y, const float *z, struct lumi_sums *sums, size_t at)
+{
+    struct cast_cell cell;
+    struct cast_search search;
+    struct reach reach;
+
+    if (!cast->kernels->cross(place, &cast->disk, x + at, y + at, z + at, &cell))
+        return;
+    reach_of(&cell, &reach);
+    /* What is met lies ahead of the eye. */
+    const float nearest = place->ez > 0 ? 0.999f / place->ez : FLT_MAX;
+    if (!narrow(view, &reach, nearest, &search))
+        return;
+    count_steps(view, &reach, &search);
+    cast->kernels->meet(view, &search, cast->disk.stretch, &cell);
+    cast->kernels->shade(view, cast->filter, &cell, sums, at);
+    for (int i = 0; i < LUMI_CELL_PIXELS; i++) {
+        const size_t k = at + (size_t)i;
+        if (!(cell.weight[i] > 0))
+            continue;
+        float cz = place->rt[6] * x[k] + place->rt[7] * y[k] + place->rt[8] * z[k];
+        sums->nearness[k] += cell.weight[i] * (cell.w[i] * cz / (1 - cell.w[i] * place->ez));
+    }
+}
+
+void lumi_cast_block(const struct lumi_cast *cast, const struct lumi_cast_eye *eye, const float *x, const float *y,
+                     const float *z, struct lumi_sums *sums)
+{
+    const struct lumi_cone cone = block_cone(x, y, z);
+
+    for (int v = 0; v < cast->count; v++) {
+        if (lumi_surface_hidden(&eye->places[v], &cone))
+            continue;
+        for (size_t at = 0; at < LUMI_BLOCK_PIXELS; at += LUMI_CELL_PIXELS)
+            cast_cell(cast, &cast->views[v], &eye->places[v], x, y, z, sums, at);
+    }
+}

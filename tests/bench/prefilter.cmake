@@ -1,0 +1,2 @@
+add_executable(bench_prefilter bench_prefilter.c)
+target_link_libraries(bench_prefilter PRIVATE lumi_flags lumi_graph lumi_prefilter lumi_image lumi_base)
