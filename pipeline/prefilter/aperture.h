@@ -2,7 +2,7 @@
 #ifndef LUMI_PIPELINE_PREFILTER_APERTURE_H
 #define LUMI_PIPELINE_PREFILTER_APERTURE_H
 
-#include "pipeline/prefilter/filter.h"
+#include "pipeline/prefilter/view_filter.h"
 
 #define PREFILTER_TAPS 4 /* of the Lanczos-2 kernel an axis, wherever it stands between samples */
 

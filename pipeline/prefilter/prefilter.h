@@ -4,7 +4,7 @@
 #ifndef LUMI_PIPELINE_PREFILTER_PREFILTER_H
 #define LUMI_PIPELINE_PREFILTER_PREFILTER_H
 
-#include "pipeline/prefilter/filter.h"
+#include "pipeline/prefilter/view_filter.h"
 #include "pipeline/run/run.h"
 
 extern const struct lumi_stage lumi_stage_prefilter;

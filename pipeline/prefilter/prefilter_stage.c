@@ -1,8 +1,8 @@
 /* The stage `prefilter`: dense views kept from image to image, the filter of one view, its file. */
+#include "pipeline/prefilter/dense_views.h"
+#include "pipeline/prefilter/disk_plan.h"
 #include "pipeline/prefilter/display.h"
-#include "pipeline/prefilter/plan.h"
 #include "pipeline/prefilter/prefilter.h"
-#include "pipeline/prefilter/shelf.h"
 #include "pipeline/run/key.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"

@@ -1,5 +1,5 @@
 /* A view's mesh as a picture of inverse depth: drawn by the renderer, from the view's own centre. */
-#include "pipeline/prefilter/filter.h"
+#include "pipeline/prefilter/view_filter.h"
 #include "proto/base/memory.h"
 #include "render/cpu/raster_block.h"
 

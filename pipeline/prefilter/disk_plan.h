@@ -1,9 +1,9 @@
 /* What the prefilter of a view reads: the disks of the field and of the dense set, and the dense views whose disks can
  * matter to a view. From places alone, so that a key can be made before anything is there. */
-#ifndef LUMI_PIPELINE_PREFILTER_PLAN_H
-#define LUMI_PIPELINE_PREFILTER_PLAN_H
+#ifndef LUMI_PIPELINE_PREFILTER_DISK_PLAN_H
+#define LUMI_PIPELINE_PREFILTER_DISK_PLAN_H
 
-#include "pipeline/prefilter/filter.h"
+#include "pipeline/prefilter/view_filter.h"
 #include "pipeline/run/run.h"
 
 struct prefilter_plan {

@@ -9,7 +9,7 @@
  * A tile is 29 × 29 pixels, made from 32 × 32 rays: one block of the renderer's. It takes samples by doubling; the
  * halves, each spread evenly over disk and pixel, are estimates of the same integral that differ by twice the standard
  * error of their mean, which is what the decision to go on is made by. */
-#include "pipeline/prefilter/filter.h"
+#include "pipeline/prefilter/view_filter.h"
 
 #include "pipeline/prefilter/aperture.h"
 #include "proto/base/memory.h"

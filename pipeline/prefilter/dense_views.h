@@ -1,6 +1,6 @@
 /* Dense views in memory, kept from image to image: neighbouring images read the same ones. */
-#ifndef LUMI_PIPELINE_PREFILTER_SHELF_H
-#define LUMI_PIPELINE_PREFILTER_SHELF_H
+#ifndef LUMI_PIPELINE_PREFILTER_DENSE_VIEWS_H
+#define LUMI_PIPELINE_PREFILTER_DENSE_VIEWS_H
 
 #include "pipeline/run/run.h"
 #include "proto/base/raster.h"

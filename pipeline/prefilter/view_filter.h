@@ -1,7 +1,7 @@
 /* The prefilter of one view (Overbeck et al. 2018, section 5, equations 4 and 5): the picture that a camera with the
  * view's disk for its aperture takes of the dense light field. */
-#ifndef LUMI_PIPELINE_PREFILTER_FILTER_H
-#define LUMI_PIPELINE_PREFILTER_FILTER_H
+#ifndef LUMI_PIPELINE_PREFILTER_VIEW_FILTER_H
+#define LUMI_PIPELINE_PREFILTER_VIEW_FILTER_H
 
 #include "render/viewset/viewset.h"
 

@@ -1,5 +1,5 @@
 /* Dense views in memory. */
-#include "pipeline/prefilter/shelf.h"
+#include "pipeline/prefilter/dense_views.h"
 
 #include "pipeline/prefilter/display.h"
 #include "proto/base/parallel.h"

@@ -1,5 +1,5 @@
 /* What the prefilter of a view reads. */
-#include "pipeline/prefilter/plan.h"
+#include "pipeline/prefilter/disk_plan.h"
 
 #include "pipeline/geometry/disks.h"
 #include "pipeline/prefilter/aperture.h"
