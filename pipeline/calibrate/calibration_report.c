@@ -1,0 +1,315 @@
+/* A calibration in words, and as JSON. */
+#include "pipeline/calibrate/calibration.h"
+
+#include <json-glib/json-glib.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MM 1000
+#define DEGREES (180 / LUMI_PI)
+#define WEAK_SHOWN 20
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+
+    return (x > y) - (x < y);
+}
+
+struct of_camera {
+    int frames, used, weak, seen, worst;
+    double rms, median_moved, median_turned, worst_moved, worst_turned;
+};
+
+/* Of one camera of the capture; −1: of all. */
+static struct of_camera sum_up(const struct lumi_run *run, const struct lumi_calibration *c, int camera)
+{
+    g_autofree double *moved = g_new(double, (gsize)run->count), *turned = g_new(double, (gsize)run->count);
+    struct of_camera o = {.worst = -1};
+    double squares = 0;
+
+    for (int i = 0; i < run->count; i++) {
+        const struct lumi_frame_outcome *f = &c->frames[i];
+        if (camera >= 0 && run->sources[i].camera != camera)
+            continue;
+        o.frames++;
+        if (!f->used)
+            continue;
+        moved[o.used] = f->moved_m;
+        turned[o.used++] = f->moved_rotation;
+        o.weak += f->weak;
+        o.seen += f->seen;
+        squares += f->rms * f->rms * f->seen;
+        if (o.worst < 0 || f->rms > c->frames[o.worst].rms)
+            o.worst = i;
+    }
+    o.rms = o.seen ? sqrt(squares / o.seen) : 0;
+    if (o.used > 0) {
+        qsort(moved, (size_t)o.used, sizeof *moved, by_value);
+        qsort(turned, (size_t)o.used, sizeof *turned, by_value);
+        o.median_moved = moved[o.used / 2];
+        o.median_turned = turned[o.used / 2];
+        o.worst_moved = moved[o.used - 1];
+        o.worst_turned = turned[o.used - 1];
+    }
+    return o;
+}
+
+static int first_of_camera(const struct lumi_run *run, int i)
+{
+    for (int k = 0; k < i; k++)
+        if (run->sources[k].camera == run->sources[i].camera)
+            return k;
+    return i;
+}
+
+static void say_cameras(const struct lumi_run *run, const struct lumi_calibration *c, GString *text)
+{
+    g_string_append(text, "\nCameras: pictures used, of all; points seen a picture; reprojection error, worst picture; "
+                          "moved from the capture's poses, median and most\n");
+    for (int i = 0; i < run->count; i++) {
+        if (first_of_camera(run, i) != i)
+            continue;
+        struct of_camera o = sum_up(run, c, run->sources[i].camera);
+        g_string_append_printf(text, "  %-12s %4d of %4d  %5.0f  %5.2f px", run->sources[i].camera_name, o.used,
+                               o.frames, o.used ? (double)o.seen / o.used : 0, o.rms);
+        if (o.worst >= 0)
+            g_string_append_printf(text, ", %s %.2f px  %6.2f mm %6.3f°, %6.2f mm %6.3f°", run->sources[o.worst].name,
+                                   c->frames[o.worst].rms, MM * o.median_moved, DEGREES * o.median_turned,
+                                   MM * o.worst_moved, DEGREES * o.worst_turned);
+        g_string_append_c(text, '\n');
+    }
+}
+
+static void say_lenses(const struct lumi_calibration *c, GString *text)
+{
+    g_string_append(text, "\nLenses: pictures; points seen; share of the picture's cells in which something was seen; "
+                          "focal length and centre, before and after\n");
+    for (int i = 0; i < c->lens_count; i++) {
+        const struct lumi_lens_outcome *l = &c->lenses[i];
+        g_string_append_printf(text, "  of %-9s %4d  %6d  %3.0f %%  %.2f → %.2f px, %.2f %.2f → %.2f %.2f%s\n", l->name,
+                               l->frames, l->observations, 100 * l->covered, l->before.fx, l->after.fx, l->before.cx,
+                               l->before.cy, l->after.cx, l->after.cy,
+                               l->self_calibrated ? "  (found from this capture: it did not fit as it was)" : "");
+    }
+}
+
+static bool is_angle(int number)
+{
+    return number != LUMI_MOUNT_RADIUS && number != LUMI_MOUNT_OFFSET;
+}
+
+static void say_mechanism(const struct lumi_calibration *c, GString *text)
+{
+    const struct lumi_mechanism *m = &c->mechanism;
+
+    if (!c->has_mechanism)
+        return;
+    g_string_append_printf(text,
+                           "\nMechanism, against its profile (± one standard deviation; cameras are beside it by "
+                           "%.2f mm and %.3f° an axis)\n",
+                           MM * m->position_spread, DEGREES * m->rotation_spread);
+    for (int k = 0; k < LUMI_PLATFORM_NUMBERS; k++) {
+        double unit = k < LUMI_PLATFORM_LEAN_X ? MM : DEGREES;
+        g_string_append_printf(text, "  %-10s %8.3f ± %.3f %s\n", lumi_platform_names[k], unit * m->platform[k],
+                               unit * m->platform_sigma[k], k < LUMI_PLATFORM_LEAN_X ? "mm" : "°");
+    }
+    for (int i = 0; i < m->rig.camera_count; i++) {
+        g_string_append_printf(text, "  %-10s", m->rig.cameras[i].name);
+        for (int k = 0; k < LUMI_MOUNT_NUMBERS; k++) {
+            double unit = is_angle(k) ? DEGREES : MM;
+            g_string_append_printf(text, "  %s %.3f ± %.3f %s", lumi_mount_names[k], unit * m->mount[i][k],
+                                   unit * m->mount_sigma[i][k], is_angle(k) ? "°" : "mm");
+        }
+        g_string_append_c(text, '\n');
+    }
+    double turn[2] = {0, 0}, drop[2] = {0, 0};
+    for (int i = 0; i < m->shot_count; i++) {
+        turn[0] = fmin(turn[0], m->turn[i]);
+        turn[1] = fmax(turn[1], m->turn[i]);
+    }
+    for (int i = 0; i < m->knot_count; i++) {
+        drop[0] = fmin(drop[0], m->drop[i]);
+        drop[1] = fmax(drop[1], m->drop[i]);
+    }
+    g_string_append_printf(text, "  platform's angle: from %.3f to %.3f° beside what was told\n", DEGREES * turn[0],
+                           DEGREES * turn[1]);
+    if (!m->rig.string.held)
+        g_string_append_printf(text, "  arm's fall: from %.3f to %.3f° beside the profile's\n", DEGREES * drop[0],
+                               DEGREES * drop[1]);
+}
+
+static void say_frames(const struct lumi_run *run, const struct lumi_calibration *c, GString *text)
+{
+    int shown = 0;
+
+    for (int i = 0; i < run->count; i++)
+        if (c->frames[i].used && c->frames[i].weak && shown++ < WEAK_SHOWN)
+            g_string_append_printf(text, "%s  %-12s %d points, %.2f mm and %.3f° beside the mechanism\n",
+                                   shown == 1 ? "\nWeak pictures: look at these first\n" : "", run->sources[i].name,
+                                   c->frames[i].seen, MM * c->frames[i].beside_m,
+                                   DEGREES * c->frames[i].beside_rotation);
+    if (shown > WEAK_SHOWN)
+        g_string_append_printf(text, "  and %d more (report.json)\n", shown - WEAK_SHOWN);
+    shown = 0;
+    for (int i = 0; i < run->count; i++)
+        if (!c->frames[i].used && shown++ < 3 * WEAK_SHOWN)
+            g_string_append_printf(text, "%s  %-12s %s\n", shown == 1 ? "\nNot used\n" : "", run->sources[i].name,
+                                   c->frames[i].why);
+    if (shown > 3 * WEAK_SHOWN)
+        g_string_append_printf(text, "  and %d more (report.json)\n", shown - 3 * WEAK_SHOWN);
+}
+
+char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibration *c)
+{
+    struct of_camera all = sum_up(run, c, -1);
+    GString *text = g_string_new(NULL);
+
+    g_string_append_printf(text, "calibrated %d of %d pictures: %.2f px, moved by %.1f mm and %.2f° (median)", c->used,
+                           c->frame_count, c->rms, MM * all.median_moved, DEGREES * all.median_turned);
+    if (c->findings->len)
+        g_string_append_printf(text, "; %u to look at", c->findings->len);
+    g_string_append_printf(text, "\n%d points, %d observations, %d taken out; weak: %d\n", c->solved.points,
+                           c->solved.observations, c->solved.outliers, all.weak);
+    if (c->findings->len)
+        g_string_append(text, "\nTo look at\n");
+    for (guint i = 0; i < c->findings->len; i++) {
+        const struct lumi_finding *f = &g_array_index(c->findings, struct lumi_finding, i);
+        g_string_append_printf(text, "  %s %s.\n", f->what, f->text);
+    }
+    say_cameras(run, c, text);
+    say_lenses(c, text);
+    say_mechanism(c, text);
+    say_frames(run, c, text);
+    return g_string_free(text, FALSE);
+}
+
+static void put(JsonBuilder *b, const char *name, double value)
+{
+    json_builder_set_member_name(b, name);
+    json_builder_add_double_value(b, isfinite(value) ? value : 0);
+}
+
+static void put_count(JsonBuilder *b, const char *name, int value)
+{
+    json_builder_set_member_name(b, name);
+    json_builder_add_int_value(b, value);
+}
+
+static void put_text(JsonBuilder *b, const char *name, const char *value)
+{
+    json_builder_set_member_name(b, name);
+    json_builder_add_string_value(b, value);
+}
+
+static void put_frames(const struct lumi_run *run, const struct lumi_calibration *c, JsonBuilder *b)
+{
+    json_builder_set_member_name(b, "frames");
+    json_builder_begin_array(b);
+    for (int i = 0; i < run->count; i++) {
+        const struct lumi_frame_outcome *f = &c->frames[i];
+        json_builder_begin_object(b);
+        put_text(b, "name", run->sources[i].name);
+        put_text(b, "camera", run->sources[i].camera_name);
+        json_builder_set_member_name(b, "used");
+        json_builder_add_boolean_value(b, f->used);
+        if (!f->used)
+            put_text(b, "why", f->why);
+        put_count(b, "seen", f->seen);
+        put(b, "rms_px", f->rms);
+        put(b, "worst_px", f->worst);
+        put(b, "moved_mm", MM * f->moved_m);
+        put(b, "moved_degrees", DEGREES * f->moved_rotation);
+        put(b, "beside_mm", MM * f->beside_m);
+        put(b, "beside_degrees", DEGREES * f->beside_rotation);
+        json_builder_set_member_name(b, "weak");
+        json_builder_add_boolean_value(b, f->weak);
+        json_builder_end_object(b);
+    }
+    json_builder_end_array(b);
+}
+
+static void put_mechanism(const struct lumi_calibration *c, JsonBuilder *b)
+{
+    const struct lumi_mechanism *m = &c->mechanism;
+
+    json_builder_set_member_name(b, "mechanism");
+    json_builder_begin_object(b);
+    put(b, "position_spread_mm", MM * m->position_spread);
+    put(b, "rotation_spread_degrees", DEGREES * m->rotation_spread);
+    for (int k = 0; k < LUMI_PLATFORM_NUMBERS; k++)
+        put(b, lumi_platform_names[k], (k < LUMI_PLATFORM_LEAN_X ? MM : DEGREES) * m->platform[k]);
+    json_builder_set_member_name(b, "cameras");
+    json_builder_begin_array(b);
+    for (int i = 0; i < m->rig.camera_count; i++) {
+        json_builder_begin_object(b);
+        put_text(b, "name", m->rig.cameras[i].name);
+        for (int k = 0; k < LUMI_MOUNT_NUMBERS; k++) {
+            g_autofree char *sigma = g_strdup_printf("%s_sigma", lumi_mount_names[k]);
+            put(b, lumi_mount_names[k], (is_angle(k) ? DEGREES : MM) * m->mount[i][k]);
+            put(b, sigma, (is_angle(k) ? DEGREES : MM) * m->mount_sigma[i][k]);
+        }
+        json_builder_end_object(b);
+    }
+    json_builder_end_array(b);
+    json_builder_end_object(b);
+}
+
+static void put_lenses(const struct lumi_calibration *c, JsonBuilder *b)
+{
+    json_builder_set_member_name(b, "lenses");
+    json_builder_begin_array(b);
+    for (int i = 0; i < c->lens_count; i++) {
+        const struct lumi_lens_outcome *l = &c->lenses[i];
+        json_builder_begin_object(b);
+        put_text(b, "camera", l->name);
+        put_count(b, "frames", l->frames);
+        put_count(b, "observations", l->observations);
+        put(b, "covered", l->covered);
+        put(b, "focal_before_px", l->before.fx);
+        put(b, "focal_px", l->after.fx);
+        json_builder_set_member_name(b, "self_calibrated");
+        json_builder_add_boolean_value(b, l->self_calibrated);
+        json_builder_end_object(b);
+    }
+    json_builder_end_array(b);
+}
+
+char *lumi_calibration_json(const struct lumi_run *run, const struct lumi_calibration *c)
+{
+    g_autoptr(JsonBuilder) b = json_builder_new();
+    g_autoptr(JsonGenerator) generator = json_generator_new();
+    struct of_camera all = sum_up(run, c, -1);
+
+    json_builder_begin_object(b);
+    put_count(b, "pictures", c->frame_count);
+    put_count(b, "used", c->used);
+    put_count(b, "weak", all.weak);
+    put_count(b, "points", c->solved.points);
+    put_count(b, "observations", c->solved.observations);
+    put_count(b, "outliers", c->solved.outliers);
+    put(b, "rms_px", c->rms);
+    put(b, "moved_median_mm", MM * all.median_moved);
+    put(b, "moved_median_degrees", DEGREES * all.median_turned);
+    json_builder_set_member_name(b, "findings");
+    json_builder_begin_array(b);
+    for (guint i = 0; i < c->findings->len; i++) {
+        const struct lumi_finding *f = &g_array_index(c->findings, struct lumi_finding, i);
+        json_builder_begin_object(b);
+        put_text(b, "what", f->what);
+        put_text(b, "text", f->text);
+        put_count(b, "frames_lost", f->frames_lost);
+        json_builder_end_object(b);
+    }
+    json_builder_end_array(b);
+    put_lenses(c, b);
+    if (c->has_mechanism)
+        put_mechanism(c, b);
+    put_frames(run, c, b);
+    json_builder_end_object(b);
+    g_autoptr(JsonNode) root = json_builder_get_root(b);
+    json_generator_set_root(generator, root);
+    json_generator_set_pretty(generator, TRUE);
+    g_autofree char *text = json_generator_to_data(generator, NULL);
+    return g_strconcat(text, "\n", NULL);
+}

@@ -1,0 +1,165 @@
+/* Priors that the pictures contradict: motions found without any prior, against what each hypothesis has. */
+#include "pipeline/calibrate/calibration.h"
+
+#include "pipeline/calibrate/rotation.h"
+#include "proto/mechanism/kinematics.h"
+
+#include <string.h>
+
+#define DEGREE (LUMI_PI / 180)
+#define LIKELY 0.7     /* share of motions that agree with a hypothesis which is taken */
+#define UNLIKELY 0.5   /* and at most with the capture as it is */
+#define FEWEST 6       /* motions that anything is concluded from */
+#define FREE_FEWEST 12 /* matches that a motion is believed from */
+
+/* What may have happened to the capture. */
+struct hypothesis {
+    int first, second; /* cameras of the rig that are in each other's place; −1: none */
+    bool backwards;    /* it turned the other way */
+};
+
+static void pose_under(const struct lumi_run *run, const struct hypothesis *h, int frame, struct lumi_pose *pose)
+{
+    const struct lumi_source *source = &run->sources[frame];
+    int camera = run->rig ? lumi_calibration_rig_camera(run, frame) : -1;
+
+    *pose = source->prior;
+    if (camera < 0 || (!h->backwards && camera != h->first && camera != h->second))
+        return;
+    if (h->first >= 0)
+        camera = camera == h->first ? h->second : camera == h->second ? h->first : camera;
+    double angle = h->backwards ? 2 * run->rig->index - source->turn_angle : source->turn_angle;
+    lumi_rig_camera_pose_at(run->rig, camera, angle, source->drop, pose);
+}
+
+static bool known(const struct lumi_motion *m)
+{
+    return m->free_count >= FREE_FEWEST &&
+           m->rotation[0] * m->rotation[0] + m->rotation[4] * m->rotation[4] + m->rotation[8] * m->rotation[8] > 0;
+}
+
+/* Whether the pictures moved as the hypothesis has it. */
+static bool agrees(const struct lumi_run *run, const struct hypothesis *h, const struct lumi_motion *m)
+{
+    const struct lumi_rig_uncertainty *u = run->rig ? &run->rig->uncertainty : NULL;
+    double sigma = u ? u->rotation : 0.5 * DEGREE, place = u ? u->position_m : 0.005;
+    struct lumi_pose a, b;
+    double between[9];
+
+    pose_under(run, h, m->a, &a);
+    pose_under(run, h, m->b, &b);
+    lumi_rotation_between(a.r, b.r, between);
+    if (lumi_rotation_angle(between, m->rotation) > fmax(4 * DEGREE, 5 * sigma))
+        return false;
+    struct lumi_vec3 moved = lumi_rotate_back(a.r, lumi_sub(b.t, a.t));
+    double length = lumi_length(moved);
+    if (length < 8 * place || lumi_dot(m->direction, m->direction) < 0.5)
+        return true; /* too short to have a direction */
+    return lumi_dot(moved, m->direction) > 0.7 * length;
+}
+
+/* Share of the motions that agree, of those that a camera takes part in (−1: of all; of two: of either). */
+static double share(const struct lumi_run *run, const struct lumi_evidence *e, const struct hypothesis *h, int first,
+                    int second, int *count)
+{
+    int agreed = 0;
+
+    *count = 0;
+    for (int i = 0; i < e->motion_count; i++) {
+        const struct lumi_motion *m = &e->motions[i];
+        int a = lumi_calibration_rig_camera(run, m->a), b = lumi_calibration_rig_camera(run, m->b);
+        if (!known(m) || (first >= 0 && a != first && b != first && a != second && b != second))
+            continue;
+        (*count)++;
+        agreed += agrees(run, h, m);
+    }
+    return *count ? (double)agreed / *count : 0;
+}
+
+static int drop_camera(const struct lumi_run *run, struct lumi_calibration *c, int camera, const char *why)
+{
+    int lost = 0;
+
+    for (int i = 0; i < run->count; i++)
+        if (lumi_calibration_rig_camera(run, i) == camera) {
+            lost += c->frames[i].used;
+            lumi_calibration_drop(c, i, "%s", why);
+        }
+    return lost;
+}
+
+/* The camera that this one is exchanged with, if both say so. */
+static int find_swap(const struct lumi_run *run, const struct lumi_evidence *e, int camera, double *agreed)
+{
+    int best = -1, count;
+
+    *agreed = 0;
+    for (int other = 0; other < run->rig->camera_count; other++) {
+        const struct hypothesis swapped = {camera, other, false}, given = {-1, -1, false};
+        if (other == camera)
+            continue;
+        double was = share(run, e, &given, camera, other, &count);
+        double is = share(run, e, &swapped, camera, other, &count);
+        if (count >= FEWEST && is > LIKELY && is > was + 0.25 && is > *agreed) {
+            *agreed = is;
+            best = other;
+        }
+    }
+    return best;
+}
+
+static void find_wrong_cameras(const struct lumi_run *run, const struct lumi_evidence *e, struct lumi_calibration *c,
+                               double overall)
+{
+    const struct hypothesis given = {-1, -1, false};
+    bool named[LUMI_RIG_CAMERAS] = {0};
+
+    for (int camera = 0; camera < run->rig->camera_count; camera++) {
+        int count;
+        double agreed, was = share(run, e, &given, camera, camera, &count);
+        if (named[camera] || count < FEWEST || was > UNLIKELY || overall < was + 0.1)
+            continue;
+        int other = find_swap(run, e, camera, &agreed);
+        const char *name = run->rig->cameras[camera].name;
+        g_autofree char *what = g_strdup_printf("camera %s", name);
+        if (other >= 0) {
+            const char *second = run->rig->cameras[other].name;
+            g_autofree char *why = g_strdup_printf("cameras %s and %s are in each other's place", name, second);
+            int lost = drop_camera(run, c, camera, why) + drop_camera(run, c, other, why);
+            lumi_calibration_find(c, lost, what,
+                                  "and camera %s are in each other's place: %.0f %% of what their pictures say agrees "
+                                  "with that, %.0f %% with the capture as it is. They are not used; exchange their "
+                                  "names in the rig profile, or their folders, and import again",
+                                  second, 100 * agreed, 100 * was);
+            named[other] = true;
+            continue;
+        }
+        int lost = drop_camera(run, c, camera, "its pictures contradict its place on the rig");
+        lumi_calibration_find(c, lost, what,
+                              "is not where the rig profile has it: %.0f %% of what its pictures say agrees with that. "
+                              "They are not used; look at its angle, mounting and lens in the profile",
+                              100 * was);
+    }
+}
+
+int lumi_calibration_wrong_priors(const struct lumi_run *run, const struct lumi_evidence *e, struct lumi_calibration *c,
+                                  struct lumi_error *error)
+{
+    const struct hypothesis given = {-1, -1, false}, backwards = {-1, -1, true};
+    int count;
+
+    if (!run->rig)
+        return LUMI_OK;
+    double was = share(run, e, &given, -1, -1, &count);
+    if (count < FEWEST)
+        return LUMI_OK;
+    double is = share(run, e, &backwards, -1, -1, &count);
+    if (is > LIKELY && was < UNLIKELY)
+        return lumi_fail(error, LUMI_ERR_FORMAT,
+                         "%s: the rig turned the other way than its profile says: %.0f %% of what the pictures say "
+                         "agrees with that, %.0f %% with the capture as it is; set direction = %d in the profile and "
+                         "import again",
+                         run->capture, 100 * is, 100 * was, -run->rig->direction);
+    find_wrong_cameras(run, e, c, was);
+    return LUMI_OK;
+}
