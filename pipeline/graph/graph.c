@@ -63,13 +63,13 @@ int lumi_graph_place(struct lumi_run *run, struct lumi_error *error)
 }
 
 int lumi_graph_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
-                    bool alone, struct lumi_run **result, struct lumi_error *error)
+                    enum lumi_run_use use, struct lumi_run **result, struct lumi_error *error)
 {
     struct lumi_run *run;
     int code = LUMI_OK;
 
     *result = NULL;
-    LUMI_TRY(lumi_run_open(capture, work, parameters, threads, alone, &run, error));
+    LUMI_TRY(lumi_run_open(capture, work, parameters, threads, use, &run, error));
     if (!first_phase_wanted(run))
         code = lumi_graph_place(run, error);
     if (code != LUMI_OK) {

@@ -12,7 +12,7 @@ const struct lumi_stage *lumi_stage_by_name(const char *name);
 /* Opens a run. What the stages of the second phase share, the views' grid and the surface the centres lie on, is chosen
  * when it is placed. Arguments as lumi_run_open. */
 int lumi_graph_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
-                    bool alone, struct lumi_run **run, struct lumi_error *error);
+                    enum lumi_run_use use, struct lumi_run **run, struct lumi_error *error);
 
 /* The stages have two phases (run.h). Before a stage of the second one is run or counted, the run must be placed;
  * lumi_graph_open does so where nothing of the first phase is wanted, lumi_graph_process between the two.

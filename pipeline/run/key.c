@@ -1,6 +1,8 @@
 /* Keys of outputs. */
 #include "pipeline/run/key.h"
 
+#include "pipeline/run/temporary.h"
+
 #include <errno.h>
 #include <glib.h>
 #include <inttypes.h>
@@ -70,7 +72,7 @@ bool lumi_key_load(const char *key_path, char hex[LUMI_KEY_HEX])
 
 int lumi_key_save(const char *key_path, const char *output, const char *hex, struct lumi_error *error)
 {
-    g_autofree char *temporary = g_strdup_printf("%s.tmp-%ld", key_path, (long)getpid());
+    g_autofree char *temporary = lumi_run_temporary(key_path, "");
     g_autofree char *name = g_path_get_basename(output);
     struct stat status;
 

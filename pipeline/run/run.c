@@ -2,6 +2,7 @@
 #include "pipeline/run/key.h"
 #include "pipeline/run/run_priv.h"
 #include "pipeline/run/sources.h"
+#include "pipeline/run/temporary.h"
 #include "proto/base/file.h"
 
 #include <errno.h>
@@ -73,35 +74,23 @@ bool lumi_run_output_key(const struct lumi_run *run, const char *stage, int inde
     return true;
 }
 
-static void remove_leftovers_in(const char *folder)
+/* Where the file system knows no locks (Lustre without "flock", NFS without its lock service) there is none to hold. */
+static int take_lock(struct lumi_run *run, bool alone, struct lumi_error *error)
 {
-    g_autoptr(GDir) dir = g_dir_open(folder, 0, NULL);
-    const char *name;
-
-    while (dir && (name = g_dir_read_name(dir)))
-        if (strstr(name, ".tmp-")) {
-            g_autofree char *path = g_build_filename(folder, name, NULL);
-            unlink(path);
-        }
+    if (flock(run->priv->lock, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) && errno == EWOULDBLOCK)
+        return lumi_fail(error, LUMI_ERR_BUSY, "%s: another run is at work there", run->work);
+    if (alone)
+        lumi_run_remove_leftovers(run->work, run->priv->lock);
+    return LUMI_OK;
 }
 
-/* What a killed run left: temporary files in the stages' folders. */
-static void remove_leftovers(const char *work)
+static int lock_work(struct lumi_run *run, enum lumi_run_use use, struct lumi_error *error)
 {
-    g_autoptr(GDir) dir = g_dir_open(work, 0, NULL);
-    const char *name;
-
-    while (dir && (name = g_dir_read_name(dir))) {
-        g_autofree char *folder = g_build_filename(work, name, NULL);
-        if (g_file_test(folder, G_FILE_TEST_IS_DIR))
-            remove_leftovers_in(folder);
-    }
-}
-
-static int lock_work(struct lumi_run *run, bool alone, struct lumi_error *error)
-{
+    const bool alone = use == LUMI_RUN_ALONE;
     g_autofree char *path = g_build_filename(run->work, ".lock", NULL);
 
+    if (use == LUMI_RUN_LOOK)
+        return LUMI_OK;
     if (g_mkdir_with_parents(run->work, 0777))
         return lumi_fail_errno(error, run->work, "create");
     run->priv->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -113,11 +102,7 @@ static int lock_work(struct lumi_run *run, bool alone, struct lumi_error *error)
     }
     if (run->priv->lock < 0)
         return lumi_fail_errno(error, path, "create");
-    if (flock(run->priv->lock, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB))
-        return lumi_fail(error, LUMI_ERR_BUSY, "%s: another run is at work there", run->work);
-    if (alone)
-        remove_leftovers(run->work);
-    return LUMI_OK;
+    return take_lock(run, alone, error);
 }
 
 static char *strip_slashes(const char *path)
@@ -164,7 +149,7 @@ static void resolve_wants(struct lumi_run *run)
 }
 
 int lumi_run_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
-                  bool alone, struct lumi_run **result, struct lumi_error *error)
+                  enum lumi_run_use use, struct lumi_run **result, struct lumi_error *error)
 {
     struct lumi_run *run = g_new0(struct lumi_run, 1);
     int code;
@@ -180,7 +165,7 @@ int lumi_run_open(const char *capture, const char *work, const struct lumi_param
     run->threads = threads;
     LUMI_GOTO(code, fail, lumi_sources_load(run, error));
     LUMI_GOTO(code, fail, lumi_file_check_output(run->work, run->capture, error));
-    LUMI_GOTO(code, fail, lock_work(run, alone, error));
+    LUMI_GOTO(code, fail, lock_work(run, use, error));
     run->dense = run->count;
     run_list_kept(run);
     resolve_wants(run);

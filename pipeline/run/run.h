@@ -135,11 +135,14 @@ struct lumi_run {
 void lumi_run_defaults(struct lumi_parameters *parameters);
 
 /* Reads the capture (every frame that has a pose, in the order of the positions), finds the surface its centres lie on,
- * makes the work directory. `work` NULL: "<capture>.work". `alone`: nobody else works in it (LUMI_ERR_BUSY if somebody
- * does), so what a killed run left half-written is removed; otherwise several runs may share it, each with its own
- * range. The grid is chosen by the caller. */
+ * makes the work directory. `work` NULL: "<capture>.work". The grid is chosen by the caller. */
+enum lumi_run_use {
+    LUMI_RUN_SHARED = 0, /* several runs share the work directory, each with its own range */
+    LUMI_RUN_ALONE = 1,  /* nobody else works in it (LUMI_ERR_BUSY if somebody does): what a killed run left goes */
+    LUMI_RUN_LOOK = 2    /* nothing is made and nobody kept out; the directory need not be there */
+};
 int lumi_run_open(const char *capture, const char *work, const struct lumi_parameters *parameters, int threads,
-                  bool alone, struct lumi_run **run, struct lumi_error *error);
+                  enum lumi_run_use use, struct lumi_run **run, struct lumi_error *error);
 void lumi_run_close(struct lumi_run *run);
 
 /* What the stages that want places start from: the run's own frames, all used and kept; or what calibration made of

@@ -1,6 +1,7 @@
 /* Running one stage over a range of images. */
 #include "pipeline/run/key.h"
 #include "pipeline/run/run_priv.h"
+#include "pipeline/run/temporary.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -56,7 +57,7 @@ static int make_one(struct work *work, const struct job *job, int thread, struct
 {
     struct lumi_run *run = work->run;
     g_autofree char *path = lumi_run_path(run, work->stage->name, job->index, work->stage->extension);
-    g_autofree char *temporary = g_strdup_printf("%s.tmp-%ld%s", path, (long)getpid(), work->stage->extension);
+    g_autofree char *temporary = lumi_run_temporary(path, work->stage->extension);
     g_autofree char *key = lumi_run_path(run, work->stage->name, job->index, ".key");
     int code = work->stage->make(run, work->state, job->index, thread, temporary, error);
 

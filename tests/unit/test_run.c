@@ -1,5 +1,6 @@
 /* pipeline/run: stages are run once, skipped when nothing changed, resumed after a failure, atomic. */
 #include "pipeline/run/run.h"
+#include "pipeline/run/temporary.h"
 #include "tests/unit/run_fixture.h"
 
 #include <glib.h>
@@ -11,6 +12,9 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <utime.h>
 
 #include <cmocka.h>
 
@@ -213,16 +217,56 @@ static void a_stage_whose_input_is_missing_says_which_stage_to_run(void **state)
     lumi_run_close(run);
 }
 
+/* The number of a process that is no more. */
+static long dead_process(void)
+{
+    const pid_t child = fork();
+
+    if (child == 0)
+        _exit(0);
+    assert_int_equal(waitpid(child, NULL, 0), child);
+    return (long)child;
+}
+
+static char *leave(const char *name)
+{
+    g_autofree char *in = g_build_filename(folder, "capture.work/first", NULL);
+    char *path = g_build_filename(in, name, NULL);
+
+    assert_int_equal(g_mkdir_with_parents(in, 0777), 0);
+    assert_true(g_file_set_contents(path, "half", -1, NULL));
+    return path;
+}
+
+static void what_other_computers_are_writing_stays(void **state)
+{
+    g_autofree char *mine = lumi_run_temporary("x", ".txt");
+    g_autofree char *place = g_strndup(mine + strlen("x.tmp-"), 8);
+    g_autofree char *dead = g_strdup_printf("v.txt.tmp-%s-%ld.txt", place, dead_process());
+    g_autofree char *alive = g_strdup_printf("v.txt.tmp-%s-%ld.txt", place, (long)getppid());
+    g_autofree char *gone = leave(dead), *stays = leave(alive);
+    g_autofree char *young = leave("v.txt.tmp-0123abcd-1.txt"), *old = leave("w.txt.tmp-0123abcd-1.txt");
+    const struct utimbuf long_ago = {.actime = 1000000000, .modtime = 1000000000};
+
+    (void)state;
+    assert_int_equal(g_utime(old, (struct utimbuf *)&long_ago), 0);
+    lumi_run_close(open_run(true));
+    assert_false(g_file_test(gone, G_FILE_TEST_EXISTS));
+    assert_true(g_file_test(stays, G_FILE_TEST_EXISTS));
+    assert_true(g_file_test(young, G_FILE_TEST_EXISTS));
+    assert_false(g_file_test(old, G_FILE_TEST_EXISTS));
+    assert_int_equal(unlink(stays) | unlink(young), 0);
+}
+
 static void one_run_alone_keeps_others_out_and_clears_what_a_killed_one_left(void **state)
 {
     g_autofree char *path = g_build_filename(folder, "capture", NULL);
-    g_autofree char *left = g_build_filename(folder, "capture.work/first/view00.txt.tmp-99999.txt", NULL);
+    g_autofree char *name = g_strdup_printf("view00.size.tmp-%ld-0", dead_process()), *left = leave(name);
     struct lumi_parameters parameters;
     struct lumi_run *run, *second;
     struct lumi_error error = {0};
 
     (void)state;
-    g_file_set_contents(left, "half", -1, NULL);
     run = open_run(true);
     assert_false(g_file_test(left, G_FILE_TEST_EXISTS));
     lumi_run_defaults(&parameters);
@@ -245,6 +289,7 @@ int main(void)
         cmocka_unit_test(an_output_that_was_cut_short_is_made_again),
         cmocka_unit_test(a_failed_image_leaves_nothing_and_is_named),
         cmocka_unit_test(a_stage_whose_input_is_missing_says_which_stage_to_run),
+        cmocka_unit_test(what_other_computers_are_writing_stays),
         cmocka_unit_test(one_run_alone_keeps_others_out_and_clears_what_a_killed_one_left),
     };
     return cmocka_run_group_tests(tests, make_capture, remove_capture);
