@@ -215,6 +215,10 @@ struct lumi_stage {
 /* How many outputs a stage has with these parameters; 0 where it is not wanted. */
 int lumi_stage_count(const struct lumi_run *run, const struct lumi_stage *stage);
 
+/* Which of them are there, made from what they would be made from now: done[0 .. count). Nothing is made; what cannot
+ * be told (an input is missing) is not done. Returns how many are. */
+int lumi_stage_done(struct lumi_run *run, const struct lumi_stage *stage, bool *done);
+
 /* Runs one stage for images [first, last), counted within those it works on; last −1: to the end. Outputs that are
  * there already are skipped; their number goes to *skipped (may be NULL). Nothing happens where it is not wanted. */
 int lumi_run_stage(struct lumi_run *run, const struct lumi_stage *stage, int first, int last, int *skipped,

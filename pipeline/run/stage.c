@@ -138,24 +138,52 @@ int lumi_stage_count(const struct lumi_run *run, const struct lumi_stage *stage)
     return (int)indices->len;
 }
 
+/* Whether the output for `index` is there with the key it would have now, which is left in `hex`. */
+static int is_there(struct lumi_run *run, const struct lumi_stage *stage, int index, char hex[LUMI_KEY_HEX],
+                    bool *there, struct lumi_error *error)
+{
+    char found[LUMI_KEY_HEX];
+    struct lumi_key key;
+
+    *there = false;
+    lumi_key_init(&key, stage->name, stage->version);
+    LUMI_TRY(stage->key(run, index, &key, error));
+    if (key.missing)
+        return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: stage '%s' needs %s, which has not been run", run->work,
+                         stage->name, key.missing_what);
+    lumi_key_hex(&key, hex);
+    g_autofree char *path = lumi_run_path(run, stage->name, index, ".key");
+    *there = lumi_key_load(path, found) && !strcmp(found, hex);
+    if (*there)
+        lumi_run_remember_key(run, stage->name, index, hex);
+    return LUMI_OK;
+}
+
+int lumi_stage_done(struct lumi_run *run, const struct lumi_stage *stage, bool *done)
+{
+    g_autoptr(GArray) indices = indices_of(run, stage);
+    int count = 0;
+
+    for (guint i = 0; i < indices->len; i++) {
+        char hex[LUMI_KEY_HEX];
+        struct lumi_error error;
+        bool there;
+        const int code = is_there(run, stage, g_array_index(indices, int, i), hex, &there, &error);
+        done[i] = code == LUMI_OK && there;
+        count += done[i];
+    }
+    return count;
+}
+
 static int find_jobs(struct lumi_run *run, const struct lumi_stage *stage, const int *indices, int count, GArray *jobs,
                      struct lumi_error *error)
 {
     for (int i = 0; i < count; i++) {
         struct job job = {.index = indices[i]};
-        char there[LUMI_KEY_HEX];
-        struct lumi_key key;
+        bool there;
 
-        lumi_key_init(&key, stage->name, stage->version);
-        LUMI_TRY(stage->key(run, job.index, &key, error));
-        if (key.missing)
-            return lumi_fail(error, LUMI_ERR_NOTFOUND, "%s: stage '%s' needs %s, which has not been run", run->work,
-                             stage->name, key.missing_what);
-        lumi_key_hex(&key, job.key);
-        g_autofree char *path = lumi_run_path(run, stage->name, job.index, ".key");
-        if (lumi_key_load(path, there) && !strcmp(there, job.key))
-            lumi_run_remember_key(run, stage->name, job.index, job.key);
-        else
+        LUMI_TRY(is_there(run, stage, job.index, job.key, &there, error));
+        if (!there)
             g_array_append_val(jobs, job);
     }
     return LUMI_OK;
