@@ -9,16 +9,25 @@
 
 #define NOT_GIVEN (-1000000)
 
-struct process_options process_options = {.density = NOT_GIVEN,
-                                          .pixels_per_degree = NOT_GIVEN,
-                                          .near_m = NOT_GIVEN,
-                                          .far_m = NOT_GIVEN,
-                                          .gp = NOT_GIVEN,
-                                          .disk_scale = NOT_GIVEN,
-                                          .neighbours = NOT_GIVEN,
-                                          .quality = NOT_GIVEN,
-                                          .cluster = NOT_GIVEN,
-                                          .target_bytes = NOT_GIVEN};
+/* What an option holds that was not given. */
+/* clang-format off */
+#define DEFAULTS \
+    { \
+        .density = NOT_GIVEN, \
+        .pixels_per_degree = NOT_GIVEN, \
+        .near_m = NOT_GIVEN, \
+        .far_m = NOT_GIVEN, \
+        .gp = NOT_GIVEN, \
+        .disk_scale = NOT_GIVEN, \
+        .neighbours = NOT_GIVEN, \
+        .quality = NOT_GIVEN, \
+        .cluster = NOT_GIVEN, \
+        .target_bytes = NOT_GIVEN, \
+    }
+/* clang-format on */
+
+const struct process_options process_defaults = DEFAULTS;
+struct process_options process_options = DEFAULTS;
 
 static int check_range(const char *name, double value, double least, double most, struct lumi_error *error)
 {

@@ -15,6 +15,7 @@ struct process_options {
     gint64 target_bytes;
 };
 extern struct process_options process_options;
+extern const struct process_options process_defaults;
 
 /* clang-format off */
 #define PROCESS_OPTIONS                                                                                                \
@@ -45,6 +46,11 @@ extern struct process_options process_options;
 
 /* Checks them and fills the parameters. */
 int process_options_read(struct lumi_parameters *parameters, struct lumi_error *error);
+
+/* Those that were given, as `--name=value`, but --work and --threads, appended to `arguments` (char *); and read again
+ * from such a list. */
+void process_options_list(GPtrArray *arguments);
+int process_options_take(const GPtrArray *arguments, struct lumi_error *error);
 
 /* A line about the run on standard error. */
 void process_options_say(const char *line);

@@ -21,7 +21,7 @@ static int count_files(const struct lumi_run *run, const struct lumi_stage *stag
     int count = 0;
 
     while (dir && (name = g_dir_read_name(dir)))
-        count += g_str_has_suffix(name, ".key");
+        count += stage->whole ? !strcmp(name, "all.key") : g_str_has_suffix(name, ".key");
     return count;
 }
 
