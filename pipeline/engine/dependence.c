@@ -10,7 +10,8 @@
 static const struct {
     const char *stage, *reads;
 } table[] = {
-    {"merge", ""},
+    {"response", ""},
+    {"merge", "response"},
     {"features", "merge"},
     {"pairs", "features"},
     {"calibrate", "merge features pairs"},
@@ -23,7 +24,8 @@ static const struct {
     {"geometry", "equiangular depth synthesize"},
     {"geometry-coarse", "equiangular depth synthesize"},
     {"prefilter", "equiangular depth synthesize geometry geometry-coarse"},
-    {"color", "equiangular synthesize prefilter"},
+    {"grade", "equiangular synthesize prefilter"},
+    {"color", "equiangular synthesize prefilter grade"},
 };
 
 static bool reads(int stage, int other)
