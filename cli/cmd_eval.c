@@ -3,12 +3,13 @@
 #include "cli/render_options.h"
 #include "pipeline/evaluate/codec_cost.h"
 #include "pipeline/evaluate/evaluate.h"
+#include "pipeline/evaluate/pose_error.h"
 
 #include <stdio.h>
 #include <string.h>
 
 static struct cli_render_options shared;
-static char *truth_file, *frames_regex, *difference, *sheet, *codec;
+static char *truth_file, *frames_regex, *difference, *sheet, *codec, *poses;
 static int sheet_views = 12;
 static gboolean json;
 
@@ -21,6 +22,10 @@ static const GOptionEntry options[] = {
     {"sheet-views", 0, 0, G_OPTION_ARG_INT, &sheet_views, "views on it, at most (12)", "N"},
     {"codec", 0, 0, G_OPTION_ARG_FILENAME, &codec,
      "instead: what compression alone cost, against the views before coding in this capture's work folder", "CAPTURE"},
+    {"poses", 0, 0, G_OPTION_ARG_FILENAME, &poses,
+     "instead: how far these are from the truth's, after the best similarity: a work folder, a places file, a "
+     "transforms.json, a COLMAP model's folder",
+     "PATH"},
     {"json", 0, 0, G_OPTION_ARG_NONE, &json, "machine-readable", NULL},
     CLI_RENDER_OPTIONS(shared),
     {0},
@@ -44,6 +49,26 @@ static int run_codec(const char *field, struct lumi_error *error)
     return LUMI_OK;
 }
 
+static int run_poses(struct lumi_error *error)
+{
+    struct lumi_pose_set found = {0}, truth = {0};
+    struct lumi_pose_error result = {0};
+    char *text = NULL;
+    int code;
+
+    LUMI_GOTO(code, out, lumi_pose_set_read(poses, &found, error));
+    LUMI_GOTO(code, out, lumi_pose_set_read(truth_file, &truth, error));
+    LUMI_GOTO(code, out, lumi_pose_error(&found, &truth, &result, error));
+    text = json ? lumi_pose_error_json(&result) : lumi_pose_error_text(&result);
+    printf("%s%s", text, json ? "\n" : "");
+out:
+    g_free(text);
+    lumi_pose_error_finish(&result);
+    lumi_pose_set_finish(&found);
+    lumi_pose_set_finish(&truth);
+    return code;
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     struct lumi_evaluate_options o = {
@@ -51,7 +76,12 @@ static int run(int argc, char **argv, struct lumi_error *error)
     struct lumi_evaluation evaluation;
     struct lumi_truth_set truth;
 
-    (void)argc;
+    if (poses && (!truth_file || codec || argc))
+        return lumi_fail(error, LUMI_ERR_ARG, "--poses PATH goes with --truth FILE alone");
+    if (poses)
+        return run_poses(error);
+    if (argc != 1)
+        return lumi_fail(error, LUMI_ERR_ARG, "FILE is wanted");
     if (!!truth_file + !!codec != 1)
         return lumi_fail(error, LUMI_ERR_ARG, "one of --truth FILE and --codec CAPTURE is wanted");
     LUMI_TRY(cli_check_threads(shared.threads, error));
@@ -72,7 +102,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
 
 const struct cli_command cli_eval = {
     .name = "eval",
-    .arguments = "FILE --truth TRANSFORMS",
+    .arguments = "[FILE] --truth TRANSFORMS",
     .summary = "compare rendered views with the truth",
     .description = "Renders the truth's views with their own lenses and sizes. For each, the mean and the worst: PSNR "
                    "of RGB; PSNR of "
@@ -81,7 +111,7 @@ const struct cli_command cli_eval = {
                    "that no view covers. Uncovered pixels count as black.\n\n"
                    "With --method plane and no --plane-distance the best single plane is searched for first.",
     .options = options,
-    .min_arguments = 1,
+    .min_arguments = 0,
     .max_arguments = 1,
     .run = run,
 };

@@ -1,0 +1,162 @@
+/* Poses that were found, against the true ones. */
+#include "pipeline/evaluate/pose_error.h"
+
+#include "pipeline/exchange/exchange.h"
+#include "pipeline/run/places.h"
+
+#include <json-glib/json-glib.h>
+#include <string.h>
+
+#define MM 1000
+#define DEGREES (180 / LUMI_PI)
+
+static char *plain_name(const char *path)
+{
+    char *name = g_path_get_basename(path), *dot = strrchr(name, '.');
+
+    if (dot && dot != name && strlen(dot) <= 5)
+        *dot = 0;
+    return name;
+}
+
+static void add(struct lumi_pose_set *set, const char *name, const struct lumi_pose *pose)
+{
+    set->names[set->count] = plain_name(name);
+    set->poses[set->count++] = *pose;
+}
+
+static void make_room(struct lumi_pose_set *set, int count)
+{
+    set->names = g_new0(char *, (gsize)count + 1);
+    set->poses = g_new0(struct lumi_pose, (gsize)count + 1);
+}
+
+static int read_places(const char *path, struct lumi_pose_set *set, struct lumi_error *error)
+{
+    struct lumi_places places = {0};
+
+    LUMI_TRY(lumi_places_read(path, &places, error));
+    make_room(set, places.count);
+    for (int i = 0; i < places.count; i++)
+        if (places.items[i].used && !places.items[i].synthetic)
+            add(set, places.items[i].name, &places.items[i].pose);
+    lumi_places_finish(&places);
+    return LUMI_OK;
+}
+
+static int read_other(const char *path, struct lumi_pose_set *set, struct lumi_error *error)
+{
+    struct lumi_import_options options;
+    struct lumi_exchange list;
+
+    lumi_import_options_init(&options);
+    options.trust = options.poses_only = true;
+    lumi_exchange_init(&list);
+    int code = lumi_import_list(path, &options, &list, error);
+    if (code == LUMI_OK) {
+        make_room(set, (int)list.images->len);
+        for (int i = 0; i < (int)list.images->len; i++) {
+            const struct lumi_exchange_image *image = lumi_exchange_image(&list, i);
+            add(set, image->original ? image->original : image->name, &image->pose);
+        }
+    }
+    lumi_exchange_finish(&list);
+    return code;
+}
+
+int lumi_pose_set_read(const char *path, struct lumi_pose_set *set, struct lumi_error *error)
+{
+    g_autofree char *inside = g_build_filename(path, "calibrate", "all.places", NULL);
+
+    *set = (struct lumi_pose_set){0};
+    if (g_file_test(inside, G_FILE_TEST_IS_REGULAR))
+        return read_places(inside, set, error);
+    if (g_str_has_suffix(path, ".places"))
+        return read_places(path, set, error);
+    return read_other(path, set, error);
+}
+
+void lumi_pose_set_finish(struct lumi_pose_set *set)
+{
+    for (int i = 0; i < set->count; i++)
+        g_free(set->names[i]);
+    g_free(set->names);
+    g_free(set->poses);
+    *set = (struct lumi_pose_set){0};
+}
+
+int lumi_pose_error(const struct lumi_pose_set *found, const struct lumi_pose_set *truth,
+                    struct lumi_pose_error *result, struct lumi_error *error)
+{
+    g_autoptr(GHashTable) table = g_hash_table_new(g_str_hash, g_str_equal);
+    g_autofree struct lumi_pose *from = g_new(struct lumi_pose, (gsize)truth->count + 1);
+    g_autofree struct lumi_pose *to = g_new(struct lumi_pose, (gsize)truth->count + 1);
+    g_autofree int *which = g_new(int, (gsize)truth->count + 1);
+    struct lumi_similarity similarity;
+    int count = 0;
+
+    *result = (struct lumi_pose_error){.truths = truth->count};
+    for (int i = 0; i < found->count; i++)
+        g_hash_table_insert(table, found->names[i], GINT_TO_POINTER(i + 1));
+    for (int i = 0; i < truth->count; i++) {
+        int at = GPOINTER_TO_INT(g_hash_table_lookup(table, truth->names[i])) - 1;
+        if (at < 0)
+            continue;
+        from[count] = found->poses[at];
+        to[count] = truth->poses[i];
+        which[count++] = i;
+    }
+    LUMI_TRY(lumi_align(count, from, to, &similarity, error));
+    LUMI_TRY(lumi_pose_compare(count, from, to, &similarity, &result->distance, error));
+    result->scale = similarity.scale;
+    result->worst = g_strdup(truth->names[which[result->distance.worst]]);
+    result->worst_turned = g_strdup(truth->names[which[result->distance.worst_turned]]);
+    return LUMI_OK;
+}
+
+void lumi_pose_error_finish(struct lumi_pose_error *result)
+{
+    g_free(result->worst);
+    g_free(result->worst_turned);
+    *result = (struct lumi_pose_error){0};
+}
+
+char *lumi_pose_error_text(const struct lumi_pose_error *r)
+{
+    const struct lumi_pose_distance *d = &r->distance;
+
+    return g_strdup_printf("poses: %d of %d; after the best similarity (scale %.6f):\n"
+                           "position  median %.3f mm, rms %.3f mm, worst %.3f mm (%s)\n"
+                           "rotation  median %.4f°, rms %.4f°, worst %.4f° (%s)\n",
+                           d->count, r->truths, r->scale, MM * d->median_m, MM * d->rms_m, MM * d->worst_m, r->worst,
+                           DEGREES * d->median_rotation, DEGREES * d->rms_rotation, DEGREES * d->worst_rotation,
+                           r->worst_turned);
+}
+
+static void put(JsonBuilder *builder, const char *name, double value)
+{
+    json_builder_set_member_name(builder, name);
+    json_builder_add_double_value(builder, value);
+}
+
+char *lumi_pose_error_json(const struct lumi_pose_error *r)
+{
+    g_autoptr(JsonBuilder) builder = json_builder_new();
+    const struct lumi_pose_distance *d = &r->distance;
+
+    json_builder_begin_object(builder);
+    put(builder, "truths", r->truths);
+    put(builder, "found", d->count);
+    put(builder, "scale", r->scale);
+    put(builder, "position_median_mm", MM * d->median_m);
+    put(builder, "position_rms_mm", MM * d->rms_m);
+    put(builder, "position_worst_mm", MM * d->worst_m);
+    put(builder, "rotation_median_degrees", DEGREES * d->median_rotation);
+    put(builder, "rotation_rms_degrees", DEGREES * d->rms_rotation);
+    put(builder, "rotation_worst_degrees", DEGREES * d->worst_rotation);
+    json_builder_set_member_name(builder, "worst");
+    json_builder_add_string_value(builder, r->worst);
+    json_builder_end_object(builder);
+    g_autoptr(JsonNode) root = json_builder_get_root(builder);
+    return json_to_string(root, FALSE);
+}

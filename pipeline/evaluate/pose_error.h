@@ -1,0 +1,32 @@
+/* Poses that were found, against the true ones. */
+#ifndef LUMI_PIPELINE_EVALUATE_POSE_ERROR_H
+#define LUMI_PIPELINE_EVALUATE_POSE_ERROR_H
+
+#include "pipeline/calibrate/align.h"
+
+/* Poses by name. */
+struct lumi_pose_set {
+    int count;
+    char **names; /* of the pictures, without folder and extension */
+    struct lumi_pose *poses;
+};
+/* From a work folder (what calibration left there), a places file (frames that are used), or what can be imported: a
+ * transforms.json, a COLMAP model's folder. */
+int lumi_pose_set_read(const char *path, struct lumi_pose_set *set, struct lumi_error *error);
+void lumi_pose_set_finish(struct lumi_pose_set *set);
+
+struct lumi_pose_error {
+    int truths; /* pictures that have a true pose; distance.count of them were found */
+    double scale;
+    struct lumi_pose_distance distance; /* after the best similarity */
+    char *worst, *worst_turned;         /* their names, owned */
+};
+/* LUMI_ERR_FORMAT where too few names are in both. */
+int lumi_pose_error(const struct lumi_pose_set *found, const struct lumi_pose_set *truth,
+                    struct lumi_pose_error *result, struct lumi_error *error);
+void lumi_pose_error_finish(struct lumi_pose_error *result);
+/* Free with g_free. */
+char *lumi_pose_error_text(const struct lumi_pose_error *result);
+char *lumi_pose_error_json(const struct lumi_pose_error *result);
+
+#endif
