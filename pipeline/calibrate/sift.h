@@ -1,5 +1,5 @@
-/* SIFT (Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", 2004) by VLFeat, the only file that names it:
- * the strongest points of a grey picture, spread evenly. */
+/* SIFT (Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", 2004) by VLFeat, the only file that names
+ * it: the strongest points of a grey picture, spread evenly. */
 #ifndef LUMI_PIPELINE_CALIBRATE_SIFT_H
 #define LUMI_PIPELINE_CALIBRATE_SIFT_H
 

@@ -1,6 +1,7 @@
 /* The stages as a graph: equiangular → match → depth → geometry and geometry-coarse → compress. */
 #include "pipeline/graph/graph.h"
 
+#include "pipeline/calibrate/features.h"
 #include "pipeline/color/color_stage.h"
 #include "pipeline/compress/compress.h"
 #include "pipeline/depth/depth.h"
@@ -20,6 +21,7 @@
 const struct lumi_stage *const lumi_stages[] = {
     &lumi_stage_response,
     &lumi_stage_merge,
+    &lumi_stage_features,
     &lumi_stage_subsample,
     &lumi_stage_equiangular,
     &lumi_stage_match,
