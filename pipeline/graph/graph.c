@@ -2,6 +2,7 @@
 #include "pipeline/graph/graph.h"
 
 #include "pipeline/calibrate/features.h"
+#include "pipeline/calibrate/pairs.h"
 #include "pipeline/color/color_stage.h"
 #include "pipeline/compress/compress.h"
 #include "pipeline/depth/depth.h"
@@ -19,20 +20,9 @@
 #include <string.h>
 
 const struct lumi_stage *const lumi_stages[] = {
-    &lumi_stage_response,
-    &lumi_stage_merge,
-    &lumi_stage_features,
-    &lumi_stage_subsample,
-    &lumi_stage_equiangular,
-    &lumi_stage_match,
-    &lumi_stage_depth,
-    &lumi_stage_geometry,
-    &lumi_stage_geometry_coarse,
-    &lumi_stage_prefilter,
-    &lumi_stage_grade,
-    &lumi_stage_color,
-    &lumi_stage_compress,
-    NULL,
+    &lumi_stage_response,    &lumi_stage_merge, &lumi_stage_features, &lumi_stage_pairs,    &lumi_stage_subsample,
+    &lumi_stage_equiangular, &lumi_stage_match, &lumi_stage_depth,    &lumi_stage_geometry, &lumi_stage_geometry_coarse,
+    &lumi_stage_prefilter,   &lumi_stage_grade, &lumi_stage_color,    &lumi_stage_compress, NULL,
 };
 
 const struct lumi_stage *lumi_stage_by_name(const char *name)
