@@ -14,15 +14,31 @@
 #include "pipeline/hdr/merge_stage.h"
 #include "pipeline/prefilter/prefilter.h"
 #include "pipeline/subsample/subsample.h"
+#include "pipeline/synthesize/synthesize.h"
 #include "proto/base/file.h"
 
 #include <glib.h>
 #include <string.h>
 
 const struct lumi_stage *const lumi_stages[] = {
-    &lumi_stage_response,    &lumi_stage_merge, &lumi_stage_features, &lumi_stage_pairs,    &lumi_stage_subsample,
-    &lumi_stage_equiangular, &lumi_stage_match, &lumi_stage_depth,    &lumi_stage_geometry, &lumi_stage_geometry_coarse,
-    &lumi_stage_prefilter,   &lumi_stage_grade, &lumi_stage_color,    &lumi_stage_compress, NULL,
+    /* clang-format off */
+    &lumi_stage_response,
+    &lumi_stage_merge,
+    &lumi_stage_features,
+    &lumi_stage_pairs,
+    &lumi_stage_subsample,
+    &lumi_stage_equiangular,
+    &lumi_stage_match,
+    &lumi_stage_depth,
+    &lumi_stage_synthesize,
+    &lumi_stage_geometry,
+    &lumi_stage_geometry_coarse,
+    &lumi_stage_prefilter,
+    &lumi_stage_grade,
+    &lumi_stage_color,
+    &lumi_stage_compress,
+    /* clang-format on */
+    NULL,
 };
 
 const struct lumi_stage *lumi_stage_by_name(const char *name)

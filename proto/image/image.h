@@ -95,7 +95,8 @@ struct lumi_image_options {
     bool subsample;      /* JPEG: 4:2:0 chroma; false: 4:4:4 */
     int bits;            /* PNG, TIFF: 8, 16 (TIFF also 32, float); 0: as the raster; F32 in PNG is 16 */
     bool half;           /* OpenEXR: 16-bit floats; false: 32-bit floats */
-    const char *channel; /* OpenEXR: name of a 1-channel raster's channel; NULL: "Y" */
+    const char *channel; /* OpenEXR: name of a 1-channel raster's channel (NULL: "Y"), or of a 4-channel one's fourth,
+                            which then is no colour and has 32 bits (NULL: "A") */
     int level;           /* PNG, OpenEXR, TIFF: deflate level 1..9; 0: a fast choice (OpenEXR: PIZ); −1: none */
     bool sync;           /* fsync before the file gets its name */
     const void *exif;    /* EXIF block to embed (JPEG, PNG), as in lumi_image_meta; may be NULL */

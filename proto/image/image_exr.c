@@ -322,10 +322,20 @@ int image_exr_channel(const struct image_source *source, const char *channel, st
 
 /* Writing */
 
+/* Which channel of the file the raster's c-th is. A fourth that was given a name is no colour: it keeps all its bits.
+ */
+static const char *channel_name(const struct lumi_raster *raster, const struct lumi_image_options *options, int c)
+{
+    static const char *const colour[4] = {"R", "G", "B", "A"};
+
+    if (raster->channels == 1)
+        return options->channel ? options->channel : "Y";
+    return c == 3 && options->channel ? options->channel : colour[c];
+}
+
 static exr_result_t declare(exr_context_t context, const struct lumi_raster *raster,
                             const struct lumi_image_options *options)
 {
-    static const char *const colour[4] = {"R", "G", "B", "A"};
     exr_compression_t compression = options->level < 0    ? EXR_COMPRESSION_NONE
                                     : options->level == 0 ? EXR_COMPRESSION_PIZ
                                                           : EXR_COMPRESSION_ZIP;
@@ -337,15 +347,15 @@ static exr_result_t declare(exr_context_t context, const struct lumi_raster *ras
     if (code == EXR_ERR_SUCCESS && options->level > 0)
         code = exr_set_zip_compression_level(context, part, options->level);
     for (int c = 0; code == EXR_ERR_SUCCESS && c < raster->channels; c++) {
-        const char *name = raster->channels == 1 ? options->channel ? options->channel : "Y" : colour[c];
-        code = exr_add_channel(context, part, name, options->half ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
+        const bool half = options->half && !(c == 3 && options->channel);
+        code = exr_add_channel(context, part, channel_name(raster, options, c), half ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
                                EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
     }
     return code == EXR_ERR_SUCCESS ? exr_write_header(context) : code;
 }
 
 static exr_result_t write_chunk(exr_context_t context, exr_encode_pipeline_t *encode, const struct lumi_raster *raster,
-                                int y)
+                                const struct lumi_image_options *options, int y)
 {
     bool first = !encode->context;
     exr_chunk_info_t chunk;
@@ -358,7 +368,9 @@ static exr_result_t write_chunk(exr_context_t context, exr_encode_pipeline_t *en
         return code;
     for (int i = 0; i < encode->channel_count; i++) {
         exr_coding_channel_info_t *channel = &encode->channels[i];
-        int c = raster->channels == 1 ? 0 : (int)(strchr("RGBA", channel->channel_name[0]) - "RGBA");
+        int c = 0;
+        while (c + 1 < raster->channels && strcmp(channel_name(raster, options, c), channel->channel_name) != 0)
+            c++;
         channel->encode_from_ptr = (const uint8_t *)(lumi_row_f32(raster, y) + c);
         channel->user_bytes_per_element = sizeof(float);
         channel->user_data_type = EXR_PIXEL_FLOAT;
@@ -386,7 +398,7 @@ static int encode_exr(const struct lumi_raster *raster, const struct lumi_image_
     if (code == EXR_ERR_SUCCESS)
         code = exr_get_scanlines_per_chunk(context, 0, &lines);
     for (int y = 0; code == EXR_ERR_SUCCESS && y < raster->height; y += lines)
-        code = write_chunk(context, &encode, raster, y);
+        code = write_chunk(context, &encode, raster, options, y);
     if (context) {
         exr_encoding_destroy(context, &encode);
         exr_result_t finished = exr_finish(&context);

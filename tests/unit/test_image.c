@@ -142,6 +142,35 @@ static void a_named_openexr_channel_is_found_by_its_name_alone(void **state)
 }
 
 /* Of floats and of halves: OpenEXR unpacks the two in different ways. */
+static void colour_and_a_named_fourth_channel_share_an_openexr_file(void **state)
+{
+    struct lumi_image_options options;
+    struct lumi_raster raster, colour, depth;
+    struct lumi_error error;
+    const char *path = "test_image_fourth.exr";
+
+    (void)state;
+    assert_int_equal(lumi_raster_create(&raster, 9, 5, 4, LUMI_F32), LUMI_OK);
+    for (int y = 0; y < 5; y++)
+        for (int x = 0; x < 36; x++)
+            lumi_row_f32(&raster, y)[x] = x % 4 == 3 ? 1.0f / 3 + (float)(x + y) : (float)(x + 40 * y) / 256;
+    lumi_image_options_init(&options);
+    options.channel = "W";
+    assert_int_equal(lumi_image_write(path, &raster, &options, &error), LUMI_OK);
+    assert_int_equal(lumi_image_read(path, 3, &colour, NULL, &error), LUMI_OK);
+    assert_int_equal(lumi_image_read_channel(path, "W", &depth, &error), LUMI_OK);
+    for (int y = 0; y < 5; y++)
+        for (int x = 0; x < 9; x++) {
+            const float *in = lumi_row_f32(&raster, y) + 4 * x, *out = lumi_row_f32(&colour, y) + 3 * x;
+            assert_true(out[0] == in[0] && out[1] == in[1] && out[2] == in[2]);
+            assert_true(lumi_row_f32(&depth, y)[x] == in[3]); /* no half: every bit is there */
+        }
+    assert_int_equal(lumi_image_read_channel(path, "A", &depth, &error), LUMI_ERR_NOTFOUND);
+    lumi_raster_finish(&raster);
+    lumi_raster_finish(&colour);
+    unlink(path);
+}
+
 static void channels_of_colour_openexr_can_be_read_one_by_one(void **state)
 {
     static const char *const names[] = {"R", "G", "B"};
@@ -354,6 +383,7 @@ int main(void)
         cmocka_unit_test(openexr_floats_come_back_exactly),
         cmocka_unit_test(openexr_halves_are_within_half_a_unit_in_the_last_place),
         cmocka_unit_test(a_named_openexr_channel_is_found_by_its_name_alone),
+        cmocka_unit_test(colour_and_a_named_fourth_channel_share_an_openexr_file),
         cmocka_unit_test(channels_of_colour_openexr_can_be_read_one_by_one),
         cmocka_unit_test(jpeg_obeys_quality_and_chroma_options),
         cmocka_unit_test(grey_and_alpha_become_rgb_when_asked),

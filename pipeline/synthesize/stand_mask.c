@@ -1,0 +1,147 @@
+/* Depth maps against the room of the stand. */
+#include "pipeline/synthesize/stand_mask.h"
+
+#include "proto/base/memory.h"
+#include "proto/base/result.h"
+
+#include <string.h>
+
+#define FLOOR_STEP 0.01 /* metres a bin */
+enum { FLOOR_WINDOW = 3, FLOOR_AROUND = 10 };
+/* Depth is not exact: what is lower than this above the floor belongs to it. */
+#define FLOOR_MARGIN 0.04
+
+void lumi_floor_init(struct lumi_floor *floor, double top)
+{
+    *floor = (struct lumi_floor){.top = top, .step = FLOOR_STEP};
+}
+
+static bool point_at(const struct lumi_grid *grid, const struct lumi_pose *pose, const struct lumi_raster *depth, int x,
+                     int y, struct lumi_vec3 *point)
+{
+    const double w = lumi_row_f32(depth, y)[x];
+    double tan_x, tan_y;
+
+    if (!(w > 1e-3))
+        return false;
+    lumi_grid_unproject(grid, x + 0.5, y + 0.5, &tan_x, &tan_y);
+    *point = lumi_to_world(pose, lumi_vec3(tan_x / w, tan_y / w, 1 / w));
+    return true;
+}
+
+void lumi_floor_add(struct lumi_floor *floor, const struct lumi_grid *grid, const struct lumi_pose *pose,
+                    const struct lumi_raster *depth, struct lumi_vec3 centre, double reach)
+{
+    for (int y = 0; y < grid->height; y += 2)
+        for (int x = 0; x < grid->width; x += 2) {
+            struct lumi_vec3 p;
+            if (!point_at(grid, pose, depth, x, y, &p) || hypot(p.x - centre.x, p.y - centre.y) > reach)
+                continue;
+            const double bin = (floor->top - p.z) / floor->step;
+            if (bin >= 0 && bin < LUMI_FLOOR_BINS) {
+                const struct lumi_vec3 d = lumi_sub(p, pose->t);
+                floor->area[(int)bin] += lumi_dot(d, d);
+            }
+        }
+}
+
+static double within(const struct lumi_floor *floor, int bin, int around)
+{
+    double sum = 0;
+
+    for (int i = bin - around; i <= bin + around; i++)
+        if (i >= 0 && i < LUMI_FLOOR_BINS)
+            sum += floor->area[i];
+    return sum;
+}
+
+bool lumi_floor_find(const struct lumi_floor *floor, double *height)
+{
+    double total = 0, best = 0, sum = 0, moment = 0;
+    int at = 0;
+
+    for (int i = 0; i < LUMI_FLOOR_BINS; i++) {
+        const double here = within(floor, i, FLOOR_WINDOW);
+        total += floor->area[i];
+        if (here > best) {
+            best = here;
+            at = i;
+        }
+    }
+    for (int i = at - FLOOR_WINDOW; i <= at + FLOOR_WINDOW; i++)
+        if (i >= 0 && i < LUMI_FLOOR_BINS) {
+            sum += floor->area[i];
+            moment += floor->area[i] * (i + 0.5);
+        }
+    if (!(total > 0) || within(floor, at, FLOOR_AROUND) < 0.25 * total)
+        return false;
+    *height = floor->top - floor->step * moment / sum;
+    return true;
+}
+
+double lumi_stand_share(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
+                        const struct lumi_raster *depth)
+{
+    /* A quarter of the way down nothing else comes as near to the axis as the cameras' circle. */
+    const double low = stand->top - 0.25 * fmin(stand->top - stand->bottom, stand->centre.z - stand->top);
+    long found = 0, all = 0;
+
+    for (int y = 0; y < grid->height; y += 2)
+        for (int x = 0; x < grid->width; x += 2, all++) {
+            struct lumi_vec3 p;
+            if (point_at(grid, pose, depth, x, y, &p) && p.z > low && p.z < stand->centre.z &&
+                hypot(p.x - stand->centre.x, p.y - stand->centre.y) < stand->narrow)
+                found++;
+        }
+    return (double)found / (double)all;
+}
+
+long lumi_stand_mask(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
+                     const struct lumi_raster *depth, uint8_t *blocked)
+{
+    long count = 0;
+
+    for (int y = 0; y < grid->height; y++)
+        for (int x = 0; x < grid->width; x++) {
+            struct lumi_vec3 p;
+            if (!point_at(grid, pose, depth, x, y, &p) || !lumi_stand_holds(stand, p, FLOOR_MARGIN))
+                continue;
+            blocked[(size_t)y * (size_t)grid->width + (size_t)x] = 1;
+            count++;
+        }
+    return count;
+}
+
+/* A line of `count` bytes `step` apart. */
+static void widen_line(uint8_t *line, size_t step, int count, int reach, uint8_t *scratch)
+{
+    int last = -reach - 1;
+
+    for (int i = 0; i < count; i++)
+        scratch[i] = line[(size_t)i * step];
+    for (int i = 0; i < count; i++) {
+        last = scratch[i] ? i : last;
+        if (i - last <= reach)
+            line[(size_t)i * step] = 1;
+    }
+    last = count + reach;
+    for (int i = count - 1; i >= 0; i--) {
+        last = scratch[i] ? i : last;
+        if (last - i <= reach)
+            line[(size_t)i * step] = 1;
+    }
+}
+
+int lumi_mask_widen(uint8_t *blocked, int width, int height, int reach)
+{
+    uint8_t *scratch = lumi_alloc((size_t)(width > height ? width : height), 1);
+
+    if (!scratch)
+        return LUMI_ERR_NOMEM;
+    for (int y = 0; y < height; y++)
+        widen_line(blocked + (size_t)y * (size_t)width, 1, width, reach, scratch);
+    for (int x = 0; x < width; x++)
+        widen_line(blocked + x, (size_t)width, height, reach, scratch);
+    lumi_free(scratch);
+    return LUMI_OK;
+}
