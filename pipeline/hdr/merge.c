@@ -53,28 +53,45 @@ static int choose_reference(const struct lumi_shot *shots, int count, double nom
     return reference;
 }
 
-/* The shot's exposure, and whether it shows anything: what was told, refined by the pictures within a third of a stop
- * (cameras round what they report); the pictures' own where nothing was told. */
-static void settle_exposure(const struct lumi_shot *reference, struct lumi_shot *shot, struct lumi_shot_report *report)
+/* What the pictures say of the shot's exposure by the reference's; 0: nothing. */
+static double measure(const struct lumi_shot *reference, const struct lumi_shot *shot)
 {
     long pixels;
     double ratio = lumi_shot_ratio(&reference->light, &shot->light, &pixels);
 
-    report->measured = pixels >= LEAST_RATIO_PIXELS ? ratio : 0;
+    return pixels >= LEAST_RATIO_PIXELS ? ratio : 0;
+}
+
+/* Before the shot is aligned: an exposure where none was told, and whether it shows anything. */
+static void guess_exposure(const struct lumi_shot *reference, struct lumi_shot *shot, struct lumi_shot_report *report)
+{
+    report->measured = measure(reference, shot);
     if (!(shot->exposure > 0)) {
         report->guessed = true;
-        shot->exposure = reference->exposure * (report->measured > 0 ? ratio : 1);
+        shot->exposure = reference->exposure * (report->measured > 0 ? report->measured : 1);
         if (!(report->measured > 0) && well_exposed(&shot->light) < 0.01)
             report->fate = LUMI_SHOT_BLACK;
     } else if (report->measured > 0) {
-        double told = shot->exposure / reference->exposure, stops = log2(ratio / told);
+        double stops = log2(report->measured * reference->exposure / shot->exposure);
         if (fabs(stops) >= LOST)
             report->fate = stops < 0 ? LUMI_SHOT_BLACK : LUMI_SHOT_WHITE;
-        else if (fabs(stops) > THIRD_STOP)
-            report->contrary = true;
-        else if (fabs(stops) > ROUNDING)
-            shot->exposure = reference->exposure * ratio;
     }
+    report->exposure = shot->exposure;
+}
+
+/* Afterwards: what was told, refined by the pictures within a third of a stop (cameras round what they report). */
+static void refine_exposure(const struct lumi_shot *reference, struct lumi_shot *shot, struct lumi_shot_report *report)
+{
+    const double ratio = measure(reference, shot);
+
+    if (!(ratio > 0))
+        return;
+    report->measured = ratio;
+    const double stops = fabs(log2(ratio * reference->exposure / shot->exposure));
+    if (stops > THIRD_STOP && !report->guessed)
+        report->contrary = true;
+    else if (stops > ROUNDING)
+        shot->exposure = reference->exposure * ratio;
     report->exposure = shot->exposure;
 }
 
@@ -105,8 +122,9 @@ static int align(const struct lumi_shot *reference, struct lumi_shot *shot, stru
 {
     struct lumi_raster moved;
 
-    LUMI_TRY(
-        lumi_shot_shift(&reference->light, &shot->light, reference->exposure / shot->exposure, &report->shift, error));
+    /* By the pictures' own measure where there is one: a wrong exposure would look like a shift of every slope. */
+    const double scale = report->measured > 0 ? 1 / report->measured : reference->exposure / shot->exposure;
+    LUMI_TRY(lumi_shot_shift(&reference->light, &shot->light, scale, &report->shift, error));
     if (fabs(report->shift.x) < LEAST_SHIFT && fabs(report->shift.y) < LEAST_SHIFT)
         return LUMI_OK;
     LUMI_TRY(lumi_shot_move(&shot->light, &report->shift, &moved, error));
@@ -174,13 +192,14 @@ static int prepare(struct merging *m, struct lumi_error *error)
             report->measured = 1;
             continue;
         }
-        settle_exposure(reference, &m->shots[k], report);
-        if (report->fate == LUMI_SHOT_USED && !report->contrary && !report->guessed)
+        guess_exposure(reference, &m->shots[k], report);
+        if (report->fate == LUMI_SHOT_USED && !report->guessed)
             report->fate = look_for_lost(reference, &m->shots[k]);
         if (report->fate != LUMI_SHOT_USED)
             continue;
         if (m->options->align)
             LUMI_TRY(align(reference, &m->shots[k], report, error));
+        refine_exposure(reference, &m->shots[k], report);
         if (m->options->ghosts)
             LUMI_TRY(lumi_ghosts_find(reference, &m->shots[k], (float)(reference->exposure / m->shots[k].exposure),
                                       m->options, &m->ghosts[k], &report->ghosts, error));

@@ -13,13 +13,19 @@
 #include <string.h>
 
 #define CODES 256
-#define SMOOTHNESS 20.0
+#define SMOOTHNESS 1.0 /* a place */
 #define LEAST_PLACES 50
 #define LEAST_SPREAD 0.3 /* of the logarithms of the exposures */
 
 static double hat(int z)
 {
     return z <= 127 ? z + 1 : 256 - z;
+}
+
+/* Codes at the ends may be of any light beyond them. */
+static bool tells(int z)
+{
+    return z > 2 && z < 252;
 }
 
 struct equations {
@@ -33,18 +39,24 @@ static void add_place(struct equations *e, const struct lumi_response_sample *sa
     double sum = 0, mean_t = 0;
 
     for (int i = 0; i < count; i++) {
-        double w = hat(samples[i].code[channel]) / 128;
+        double w = tells(samples[i].code[channel]) ? hat(samples[i].code[channel]) / 128 : 0;
         sum += w * w;
         mean_t += w * w * (double)samples[i].log_exposure;
     }
+    if (!(sum > 0))
+        return;
     mean_t /= sum;
     for (int i = 0; i < count; i++) {
         int zi = samples[i].code[channel];
+        if (!tells(zi))
+            continue;
         double wi = hat(zi) * hat(zi) / (128.0 * 128);
         e->a[zi][zi] += wi;
         e->b[zi] += wi * ((double)samples[i].log_exposure - mean_t);
         for (int j = 0; j < count; j++) {
             int zj = samples[j].code[channel];
+            if (!tells(zj))
+                continue;
             e->a[zi][zj] -= wi * hat(zj) * hat(zj) / (128.0 * 128) / sum;
         }
     }
@@ -119,10 +131,10 @@ static void to_light(const double g[CODES], int lowest, float light[CODES])
     light[0] = 0;
 }
 
-static int estimate_channel(struct equations *e, const struct lumi_response_sample *samples, int count, int channel,
-                            float light[CODES])
+static int estimate_channel(struct equations *e, const struct lumi_response_sample *samples, int count, int places,
+                            int channel, float light[CODES])
 {
-    int seen[CODES] = {0}, lowest = 1;
+    int seen[CODES] = {0}, lowest = 3;
 
     memset(e, 0, sizeof *e);
     for (int first = 0, last; first < count; first = last) {
@@ -130,7 +142,7 @@ static int estimate_channel(struct equations *e, const struct lumi_response_samp
             seen[samples[last].code[channel]]++;
         add_place(e, samples + first, last - first, channel);
     }
-    add_smoothness(e, SMOOTHNESS);
+    add_smoothness(e, SMOOTHNESS * places);
     if (!solve(e))
         return LUMI_ERR_FORMAT;
     make_monotone(e->b);
@@ -160,7 +172,7 @@ int lumi_response_estimate(const struct lumi_response_sample *samples, int count
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a response");
     int code = LUMI_OK;
     for (int c = 0; c < 3 && code == LUMI_OK; c++)
-        code = estimate_channel(e, samples, count, c, response->light[c]);
+        code = estimate_channel(e, samples, count, places, c, response->light[c]);
     lumi_free(e);
     return code == LUMI_OK ? LUMI_OK : lumi_fail(error, code, "the pictures do not tell the camera's response");
 }

@@ -1,0 +1,5 @@
+lumi_fuzz(fuzz_cube FOLDERS color base)
+lumi_fuzz(fuzz_icc FOLDERS color base)
+lumi_fuzz(fuzz_grade FOLDERS color base)
+lumi_fuzz(fuzz_gains FOLDERS equiangular base)
+lumi_fuzz(fuzz_response FOLDERS hdr base)

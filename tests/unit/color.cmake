@@ -1,0 +1,8 @@
+lumi_test(test_merge FOLDERS hdr)
+lumi_test(test_response FOLDERS hdr)
+lumi_test(test_merge_stage FOLDERS hdr run capture image)
+lumi_test(test_gains FOLDERS equiangular)
+lumi_test(test_equalize FOLDERS color)
+lumi_test(test_cube FOLDERS color)
+lumi_test(test_icc FOLDERS color)
+lumi_test(test_tone FOLDERS color)
