@@ -7,7 +7,10 @@
 #include <math.h>
 
 static char *out, *rig_text, *size_text, *format_text, *lens_text, *depth_dir;
-static char *pose_error, *mechanism_error, *truth_poses, *truth_capture;
+static char *pose_error, *mechanism_error, *truth_poses, *truth_capture, *bracket_text;
+static char **fault_texts;
+static gboolean tripod, arm;
+static double camera_gain;
 static int threads, bits, seed = 1;
 static double fov, scale = 1, turned, exposure, vignetting, full_well, read_noise;
 static gboolean inward;
@@ -40,6 +43,16 @@ static const GOptionEntry options[] = {
      "FILE"},
     {"truth-capture", 0, 0, G_OPTION_ARG_FILENAME, &truth_capture,
      "also makes a second capture: the same pictures with their true poses", "CAPTURE"},
+    {"tripod", 0, 0, G_OPTION_ARG_NONE, &tripod, "the rig stands on one, and sees it", NULL},
+    {"arm", 0, 0, G_OPTION_ARG_NONE, &arm, "the end of the rig's arm is in every picture", NULL},
+    {"camera-gain", 0, 0, G_OPTION_ARG_DOUBLE, &camera_gain,
+     "every camera has a gain of its own, of this standard deviation; some frames drift (0)", "STOPS"},
+    {"brackets", 0, 0, G_OPTION_ARG_STRING, &bracket_text,
+     "a shot at each of these stops, as -2,0,2; what was exposed is reported, a little off", "STOPS,..."},
+    {"fault", 0, 0, G_OPTION_ARG_STRING_ARRAY, &fault_texts,
+     "unfocused=CAMERA, black=FRAME, swapped=CAMERA:CAMERA, backwards, missing-row=ROW, isolated=CAMERA, "
+     "unequal-brackets; may be given again",
+     "FAULT"},
     {"turned", 0, 0, G_OPTION_ARG_DOUBLE, &turned,
      "degrees that the rig turns during every exposure: motion blur about the true pose (0)", "DEGREES"},
     {"exposure", 0, 0, G_OPTION_ARG_DOUBLE, &exposure, "stops (0)", "STOPS"},
@@ -95,16 +108,38 @@ static int parse(struct sim_rig_options *rig, struct sim_output *output, struct 
     return sim_sensor_check(&output->sensor, error);
 }
 
-static int make_errors(struct sim_rig *rig, struct sim_output *output, struct lumi_error *error)
+static int make_takes(struct sim_takes *takes, struct lumi_error *error)
 {
-    struct sim_errors errors = {.seed = (uint64_t)seed};
+    g_auto(GStrv) parts = g_strsplit(bracket_text ? bracket_text : "", ",", -1);
+
+    *takes = (struct sim_takes){.gain = camera_gain, .arm = arm, .seed = (uint64_t)seed};
+    if (!(camera_gain >= 0 && camera_gain <= 4))
+        return lumi_fail(error, LUMI_ERR_ARG, "--camera-gain %g: 0 to 4 stops wanted", camera_gain);
+    for (int i = 0; fault_texts && fault_texts[i]; i++)
+        LUMI_TRY(sim_takes_add_fault(takes, fault_texts[i], error));
+    for (int i = 0; parts[i]; i++) {
+        if (i == SIM_BRACKET)
+            return lumi_fail(error, LUMI_ERR_ARG, "--brackets: at most %d shots wanted", SIM_BRACKET);
+        LUMI_TRY(cli_parse_doubles("--brackets", parts[i], ',', 1, &takes->brackets[i], error));
+        if (!(fabs(takes->brackets[i]) <= 10))
+            return lumi_fail(error, LUMI_ERR_ARG, "--brackets %s: -10 to 10 stops wanted", parts[i]);
+        takes->bracket_count = i + 1;
+        takes->base_s = 0.004;
+    }
+    return LUMI_OK;
+}
+
+static int make_errors(const struct sim_takes *takes, struct sim_rig *rig, struct sim_output *output,
+                       struct lumi_error *error)
+{
+    struct sim_errors errors = {.seed = (uint64_t)seed, .backwards = sim_takes_has(takes, SIM_FAULT_BACKWARDS)};
     double numbers[2] = {0, 0};
 
     if (pose_error)
         LUMI_TRY(cli_parse_doubles("--pose-error", pose_error, ',', 2, numbers, error));
     if (mechanism_error)
         LUMI_TRY(sim_errors_parse(mechanism_error, &errors.mechanism, error));
-    if (!pose_error && !mechanism_error)
+    if (!pose_error && !mechanism_error && !errors.backwards && !sim_takes_has(takes, SIM_FAULT_SWAPPED))
         return LUMI_OK;
     errors.position_m = numbers[0] / 1000;
     errors.rotation = numbers[1] * LUMI_PI / 180;
@@ -112,17 +147,26 @@ static int make_errors(struct sim_rig *rig, struct sim_output *output, struct lu
     return sim_errors_apply(&errors, rig, error);
 }
 
+static int open_place(const char *name, const struct sim_rig *rig, struct sim_scene **scene, struct lumi_error *error)
+{
+    if (tripod && rig->plane)
+        return lumi_fail(error, LUMI_ERR_ARG, "--tripod: cameras on a sphere are wanted");
+    return tripod ? sim_place_open_stand(name, rig->radius, scene, error) : sim_place_open(name, scene, error);
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     struct sim_rig_options rig_options;
     struct sim_scene *scene = NULL;
     struct sim_output output;
+    struct sim_takes takes;
     struct sim_rig rig = {0};
     const struct sim_shoot_truth truth = {truth_poses, truth_capture};
     int code;
 
     (void)argc;
     LUMI_TRY(parse(&rig_options, &output, error));
+    LUMI_TRY(make_takes(&takes, error));
     output.context = argv[0];
     if (!(fabs(turned) <= 90))
         return lumi_fail(error, LUMI_ERR_ARG, "--turned %g: -90 to 90 degrees wanted", turned);
@@ -132,9 +176,10 @@ static int run(int argc, char **argv, struct lumi_error *error)
         goto done;
     }
     output.profile = &rig.profile;
-    LUMI_GOTO(code, done, make_errors(&rig, &output, error));
-    LUMI_GOTO(code, done, sim_place_open(argv[0], &scene, error));
-    LUMI_GOTO(code, done, sim_shoot(scene, argv[0], &rig, &output, &truth, out, error));
+    LUMI_GOTO(code, done, make_errors(&takes, &rig, &output, error));
+    LUMI_GOTO(code, done, sim_takes_apply(&takes, &rig, error));
+    LUMI_GOTO(code, done, open_place(argv[0], &rig, &scene, error));
+    LUMI_GOTO(code, done, sim_shoot(scene, argv[0], &rig, &output, &takes, &truth, out, error));
 done:
     sim_scene_destroy(scene);
     sim_rig_finish(&rig);

@@ -111,7 +111,8 @@ static void mechanism_pose(const struct sim_errors *e, const struct lumi_rig *ri
 {
     const struct sim_mechanism_error *m = &e->mechanism;
     double sweep = (double)view->position / (rig->positions * rig->turns);
-    double drop = view->drop, angle = view->turn_angle, phase = 2 * LUMI_PI * unit(e->seed, 3, WHOLE);
+    double drop = view->drop, angle = e->backwards ? 2 * rig->index - view->turn_angle : view->turn_angle;
+    double phase = 2 * LUMI_PI * unit(e->seed, 3, WHOLE);
     double lean = 2 * LUMI_PI * unit(e->seed, 4, WHOLE), aside = 2 * LUMI_PI * unit(e->seed, 5, WHOLE);
     double wobble = angle + 2 * LUMI_PI * unit(e->seed, 6, WHOLE);
     struct lumi_pose tilted = {0};
@@ -148,7 +149,7 @@ int sim_errors_apply(const struct sim_errors *e, struct sim_rig *rig, struct lum
 
     if (!(e->position_m >= 0 && e->position_m <= 1) || !(e->rotation >= 0 && e->rotation <= LUMI_PI / 2))
         return lumi_fail(error, LUMI_ERR_ARG, "pose error: up to 1000 mm and 90 degrees wanted");
-    if (mechanism_wrong(&e->mechanism) && !rig->mechanism)
+    if ((mechanism_wrong(&e->mechanism) || e->backwards) && !rig->mechanism)
         return lumi_fail(error, LUMI_ERR_ARG,
                          "mechanism error: a rig that turns is wanted: arc16, arc16x2, bar2, arc:…");
     true_profile(e, &rig->profile, &real);

@@ -25,6 +25,7 @@ struct sim_mechanism_error {
 struct sim_errors {
     double position_m, rotation; /* of a frame, along and about each axis: one standard deviation */
     struct sim_mechanism_error mechanism;
+    bool backwards; /* the platform turns the other way than it tells */
     uint64_t seed;
 };
 

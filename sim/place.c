@@ -1,11 +1,14 @@
 /* The list of places. */
 #include "sim/place.h"
 
+#include "sim/tripod.h"
+
 #include <string.h>
 
 const struct sim_place *const sim_places[] = {&sim_room, &sim_court, &sim_object, NULL};
 
-int sim_place_open(const char *name, struct sim_scene **result, struct lumi_error *error)
+/* A radius of 0: no stand. */
+static int open_place(const char *name, double radius, struct sim_scene **result, struct lumi_error *error)
 {
     const struct sim_place *place = NULL;
     struct sim_scene *scene;
@@ -18,10 +21,22 @@ int sim_place_open(const char *name, struct sim_scene **result, struct lumi_erro
         return lumi_fail(error, LUMI_ERR_ARG, "no place '%s': room, court and object there are", name);
     LUMI_TRY(sim_scene_create(&scene, error));
     place->build(scene);
+    if (radius > 0)
+        sim_stand_add(scene, radius);
     int code = sim_scene_commit(scene, error);
     if (code == LUMI_OK)
         *result = scene;
     else
         sim_scene_destroy(scene);
     return code;
+}
+
+int sim_place_open(const char *name, struct sim_scene **result, struct lumi_error *error)
+{
+    return open_place(name, 0, result, error);
+}
+
+int sim_place_open_stand(const char *name, double radius, struct sim_scene **result, struct lumi_error *error)
+{
+    return open_place(name, radius, result, error);
 }

@@ -112,38 +112,57 @@ static int render(const struct sim_scene *scene, const struct sim_view *view, co
     return LUMI_OK;
 }
 
-int sim_view_encode(const struct sim_scene *scene, const struct sim_view *view, int index,
-                    const struct sim_output *output, const char *depth_path, uint8_t **data, size_t *size,
-                    struct lumi_error *error)
+int sim_view_render(const struct sim_scene *scene, const struct sim_view *view, const struct sim_output *output,
+                    const char *depth_path, struct lumi_raster *light, struct lumi_error *error)
 {
-    struct lumi_raster color = {0}, depth = {0}, coded = {0};
+    struct lumi_raster depth = {0};
+
+    *light = (struct lumi_raster){0};
+    int code = render(scene, view, output, light, depth_path ? &depth : NULL, error);
+    if (code == LUMI_OK && depth_path)
+        code = write_depth(depth_path, &depth, error);
+    lumi_raster_finish(&depth);
+    if (code != LUMI_OK)
+        lumi_raster_finish(light);
+    return code;
+}
+
+/* What stands in the file: sRGB, but for OpenEXR. */
+static int encode_picture(const struct sim_output *output, const struct lumi_raster *color, uint8_t **data,
+                          size_t *size, struct lumi_error *error)
+{
     struct lumi_image_options options;
-    int code;
+    struct lumi_raster coded = {0};
 
     image_options(output, &options);
-    LUMI_GOTO(code, done, render(scene, view, output, &color, depth_path ? &depth : NULL, error));
-    if (depth_path)
-        LUMI_GOTO(code, done, write_depth(depth_path, &depth, error));
-    if (output->format == SIM_FORMAT_DNG) {
-        code = encode_raw(output, index, &color, data, size, error);
-        goto done;
-    }
-    sim_sensor_apply(&output->sensor, (uint64_t)index, &color);
-    if (output->format == SIM_FORMAT_EXR) {
-        LUMI_GOTO(code, done, lumi_image_encode(&color, &options, data, size, error));
-    } else {
-        code = lumi_raster_convert(&color, options.bits == 16 && options.format == LUMI_IMAGE_PNG ? LUMI_U16 : LUMI_U8,
-                                   &coded);
-        if (code != LUMI_OK) {
-            lumi_fail(error, code, "no memory for a picture");
-            goto done;
-        }
-        LUMI_GOTO(code, done, lumi_image_encode(&coded, &options, data, size, error));
-    }
-done:
-    lumi_raster_finish(&color);
-    lumi_raster_finish(&depth);
+    if (output->format == SIM_FORMAT_EXR)
+        return lumi_image_encode(color, &options, data, size, error);
+    int code =
+        lumi_raster_convert(color, options.bits == 16 && options.format == LUMI_IMAGE_PNG ? LUMI_U16 : LUMI_U8, &coded);
+    if (code != LUMI_OK)
+        return lumi_fail(error, code, "no memory for a picture");
+    code = lumi_image_encode(&coded, &options, data, size, error);
     lumi_raster_finish(&coded);
+    return code;
+}
+
+int sim_view_encode(const struct lumi_raster *light, int index, double stops, const struct sim_output *output,
+                    uint8_t **data, size_t *size, struct lumi_error *error)
+{
+    struct sim_output shot = *output;
+    struct lumi_raster color;
+
+    shot.sensor.exposure += stops;
+    if (output->format == SIM_FORMAT_DNG)
+        return encode_raw(&shot, index, light, data, size, error);
+    if (lumi_raster_create(&color, light->width, light->height, light->channels, LUMI_F32) != LUMI_OK)
+        return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for a picture");
+    for (int y = 0; y < light->height; y++)
+        memcpy(lumi_row_f32(&color, y), lumi_row_f32(light, y),
+               (size_t)light->width * (size_t)light->channels * sizeof(float));
+    sim_sensor_apply(&shot.sensor, (uint64_t)index, &color);
+    int code = encode_picture(&shot, &color, data, size, error);
+    lumi_raster_finish(&color);
     return code;
 }
 
@@ -226,11 +245,14 @@ static int write_views(const struct sim_scene *scene, const struct sim_rig *view
     for (int i = 0; i < views->count; i++) {
         const struct sim_view *view = &views->views[i];
         g_autofree char *name = view_name(views, i), *path = NULL, *depth = NULL;
+        struct lumi_raster light;
         uint8_t *data = NULL;
         size_t size = 0;
         view_paths(places, output, name, &path, &depth);
         *begun = i + 1;
-        int code = sim_view_encode(scene, view, i, output, depth, &data, &size, error);
+        LUMI_TRY(sim_view_render(scene, view, output, depth, &light, error));
+        int code = sim_view_encode(&light, i, 0, output, &data, &size, error);
+        lumi_raster_finish(&light);
         if (code == LUMI_OK)
             code = lumi_file_write(path, data, size, false, error);
         lumi_free(data);

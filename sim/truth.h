@@ -38,11 +38,13 @@ int sim_truth_write(const struct sim_scene *scene, const struct sim_rig *views, 
 int sim_truth_poses(const struct sim_rig *views, enum sim_format format, const char *path, struct lumi_error *error);
 char *sim_frame_name(const struct sim_view *view); /* g_free */
 
-/* One view as the bytes of a picture file; `index` is the frame's number for the sensor. Release *data with lumi_free.
- * If depth_path is not NULL the depth map is written there. */
-int sim_view_encode(const struct sim_scene *scene, const struct sim_view *view, int index,
-                    const struct sim_output *output, const char *depth_path, uint8_t **data, size_t *size,
-                    struct lumi_error *error);
+/* The light of one view, linear; released by the caller. If depth_path is not NULL the depth map is written there. */
+int sim_view_render(const struct sim_scene *scene, const struct sim_view *view, const struct sim_output *output,
+                    const char *depth_path, struct lumi_raster *light, struct lumi_error *error);
+/* Such light as the bytes of a picture file; `index` is the frame's number for the sensor, `stops` come on top of its
+ * exposure. The light is kept. Release *data with lumi_free. */
+int sim_view_encode(const struct lumi_raster *light, int index, double stops, const struct sim_output *output,
+                    uint8_t **data, size_t *size, struct lumi_error *error);
 
 const char *sim_format_extension(enum sim_format format);
 

@@ -73,8 +73,8 @@ static void a_capture_holds_every_frame_with_its_true_pose(void **state)
         sim_output_init(&output);
         output.depth_dir = depth;
         output.threads = 2;
-        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, NULL, path, &error), LUMI_OK);
-        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, NULL, path, &error), LUMI_ERR_EXISTS);
+        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, NULL, NULL, path, &error), LUMI_OK);
+        assert_int_equal(sim_shoot(f->scene, "object", &rig, &output, NULL, NULL, path, &error), LUMI_ERR_EXISTS);
         assert_int_equal(lumi_capture_open(path, LUMI_CAPTURE_READ, &capture, &error), LUMI_OK);
         assert_int_equal(lumi_capture_get_meta(capture, "surface", meta, sizeof meta, &error), LUMI_OK);
         assert_string_equal(meta, k ? "sphere" : "plane");
@@ -195,7 +195,9 @@ static void sensor_values_are_a_file_that_develops_to_the_picture(void **state)
     sim_output_init(&output);
     output.format = SIM_FORMAT_DNG;
     assert_string_equal(sim_format_extension(output.format), ".dng");
-    assert_int_equal(sim_view_encode(f->scene, &rig.views[0], 0, &output, NULL, &data, &size, NULL), LUMI_OK);
+    assert_int_equal(sim_view_render(f->scene, &rig.views[0], &output, NULL, &picture, NULL), LUMI_OK);
+    assert_int_equal(sim_view_encode(&picture, 0, 0, &output, &data, &size, NULL), LUMI_OK);
+    lumi_raster_finish(&picture);
     g_autofree char *path = g_strdup_printf("%s/view.dng", f->dir);
     assert_true(g_file_set_contents(path, (const char *)data, (gssize)size, NULL));
     lumi_free(data);
