@@ -1,1 +1,2 @@
 lumi_test(test_bundle FOLDERS calibrate mechanism LABELS slow)
+lumi_test(test_bundle_parts FOLDERS calibrate mechanism)
