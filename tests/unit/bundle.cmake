@@ -1,2 +1,3 @@
 lumi_test(test_bundle FOLDERS calibrate mechanism LABELS slow)
 lumi_test(test_bundle_parts FOLDERS calibrate mechanism)
+lumi_test(test_calibration FOLDERS calibrate mechanism run LABELS slow)

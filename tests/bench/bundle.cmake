@@ -1,0 +1,2 @@
+add_executable(bench_bundle bench_bundle.c)
+target_link_libraries(bench_bundle PRIVATE lumi_flags lumi_calibrate lumi_mechanism lumi_base)
