@@ -17,7 +17,7 @@ enum {
     FREE_FRAMES = 12, /* of a camera are also matched without the prior */
     FREE_FEATURES = 1500
 };
-#define FIT_PIXELS 2.0     /* a match is no further from the pair's own motion */
+#define FIT_PIXELS 1.5     /* a match is no further from the pair's own motion */
 #define FREE_PARALLAX 0.08 /* radians: what free matching takes for near enough to a rotation */
 
 static bool wanted(const struct lumi_run *run, int index)
@@ -128,7 +128,7 @@ static int match_in_band(const struct couple *couple, const struct lumi_band *ba
     lumi_matches_finish(matches);
     if (!found)
         return LUMI_OK;
-    LUMI_TRY(lumi_match_features(couple->first, couple->second, motion, &narrow, 0.9, LUMI_FEATURES_MAX, matches));
+    LUMI_TRY(lumi_match_features(couple->first, couple->second, motion, &narrow, 0.75, LUMI_FEATURES_MAX, matches));
     found = matches->count >= FEWEST && lumi_motion_refine(motion, matches->sights, matches->count, fit, fit / 3);
     if (found)
         lumi_matches_keep(matches, motion, fit);

@@ -20,6 +20,7 @@ void lumi_track_graph_finish(struct lumi_track_graph *graph)
         lumi_free(graph->images[i].places);
     lumi_free(graph->images);
     lumi_free(graph->parent);
+    lumi_free(graph->edges);
     *graph = (struct lumi_track_graph){0};
 }
 
@@ -69,13 +70,71 @@ int lumi_track_graph_begin(struct lumi_track_graph *graph)
     return LUMI_OK;
 }
 
-bool lumi_track_graph_join(struct lumi_track_graph *graph, int i, uint32_t a, int k, uint32_t b)
+/* The first of those of a picture that are in the same place. */
+static int number_of(const struct lumi_track_graph *graph, int image, uint32_t feature)
+{
+    const struct lumi_track_image *own = &graph->images[image];
+
+    while (feature > 0 && own->places[feature].x == own->places[feature - 1].x &&
+           own->places[feature].y == own->places[feature - 1].y)
+        feature--;
+    return own->first + (int)feature;
+}
+
+int lumi_track_graph_join(struct lumi_track_graph *graph, int i, uint32_t a, int k, uint32_t b)
 {
     if (i < 0 || k < 0 || i >= graph->image_count || k >= graph->image_count || a >= (uint32_t)graph->images[i].count ||
         b >= (uint32_t)graph->images[k].count)
-        return false;
-    unite(graph, graph->images[i].first + (int)a, graph->images[k].first + (int)b);
-    return true;
+        return LUMI_ERR_FORMAT;
+    if (graph->edge_count == graph->edge_room) {
+        const int room = graph->edge_room ? 2 * graph->edge_room : 4096;
+        struct lumi_track_edge *edges = lumi_realloc(graph->edges, (size_t)room, sizeof *edges);
+        if (!edges)
+            return LUMI_ERR_NOMEM;
+        graph->edges = edges;
+        graph->edge_room = room;
+    }
+    graph->edges[graph->edge_count++] = (struct lumi_track_edge){number_of(graph, i, a), number_of(graph, k, b)};
+    return LUMI_OK;
+}
+
+/* Whether something that matches a also matches b: three pictures that agree are hardly ever wrong. */
+static bool supported(const int *begin, const int *others, int a, int b)
+{
+    for (int i = begin[a]; i < begin[a + 1]; i++)
+        for (int k = begin[b]; k < begin[b + 1]; k++)
+            if (others[i] == others[k])
+                return true;
+    return false;
+}
+
+/* Joins what three pictures agree on. */
+static int join_edges(struct lumi_track_graph *graph)
+{
+    int *begin = lumi_calloc((size_t)graph->node_count + 2, sizeof *begin);
+    int *others = lumi_alloc(2 * (size_t)graph->edge_count + 1, sizeof *others);
+
+    if (!begin || !others) {
+        lumi_free(begin);
+        lumi_free(others);
+        return LUMI_ERR_NOMEM;
+    }
+    for (int i = 0; i < graph->edge_count; i++) {
+        begin[graph->edges[i].a + 2]++;
+        begin[graph->edges[i].b + 2]++;
+    }
+    for (int i = 2; i <= graph->node_count + 1; i++)
+        begin[i] += begin[i - 1];
+    for (int i = 0; i < graph->edge_count; i++) {
+        others[begin[graph->edges[i].a + 1]++] = graph->edges[i].b;
+        others[begin[graph->edges[i].b + 1]++] = graph->edges[i].a;
+    }
+    for (int i = 0; i < graph->edge_count; i++)
+        if (supported(begin, others, graph->edges[i].a, graph->edges[i].b))
+            unite(graph, graph->edges[i].a, graph->edges[i].b);
+    lumi_free(begin);
+    lumi_free(others);
+    return LUMI_OK;
 }
 
 /* A feature of a track. */
@@ -193,11 +252,11 @@ static void choose(const struct lumi_track_graph *graph, const struct node *node
         }
 }
 
-/* What SIFT's places are good for: a fifth of a pixel, and a share of how large the feature is (docs/calibration.md).
+/* What SIFT's places are good for: an eighth of a pixel, and a share of how large the feature is (docs/calibration.md).
  */
 static float sigma_of(float scale)
 {
-    return hypotf(0.2f, 0.1f * scale);
+    return hypotf(0.13f, 0.06f * scale);
 }
 
 static int gather(const struct lumi_track_graph *graph, const struct node *nodes, const struct chain *chains, int count,
@@ -239,7 +298,7 @@ int lumi_track_graph_choose(struct lumi_track_graph *graph, const struct lumi_tr
     int code = LUMI_ERR_NOMEM;
 
     *tracks = (struct lumi_tracks){0};
-    if (nodes && chains && census.images && census.tiles) {
+    if (nodes && chains && census.images && census.tiles && join_edges(graph) == LUMI_OK) {
         const int count = find_chains(graph, settings->shortest, nodes, chains);
         choose(graph, nodes, chains, count, settings->per_image, &census);
         code = gather(graph, nodes, chains, count, tracks);

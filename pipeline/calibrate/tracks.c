@@ -38,12 +38,12 @@ static int read_pairs(const struct lumi_run *run, int index, GHashTable *names, 
         const struct lumi_pair *pair = &list.items[i];
         const int other = GPOINTER_TO_INT(g_hash_table_lookup(names, pair->name)) - 1;
         for (int k = 0; k < pair->match_count && code == LUMI_OK; k++)
-            if (!lumi_track_graph_join(graph, index, pair->matches[k].a, other, pair->matches[k].b))
-                code =
-                    lumi_fail(error, LUMI_ERR_FORMAT, "%s: matches features that %s does not have", path, pair->name);
+            code = lumi_track_graph_join(graph, index, pair->matches[k].a, other, pair->matches[k].b);
     }
     lumi_pairs_finish(&list);
-    return code;
+    if (code == LUMI_ERR_FORMAT)
+        return lumi_fail(error, code, "%s: matches features that are not there", path);
+    return code == LUMI_OK ? code : lumi_fail(error, code, "not enough memory to join tracks");
 }
 
 int lumi_tracks_build(const struct lumi_run *run, const struct lumi_tracks_settings *settings,

@@ -1,0 +1,2 @@
+add_executable(bench_tracks bench_tracks.c)
+target_link_libraries(bench_tracks PRIVATE lumi_flags lumi_calibrate lumi_run lumi_base)
