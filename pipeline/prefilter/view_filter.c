@@ -38,7 +38,7 @@ struct sums {
 /* What a thread works in. */
 struct scratch {
     float x[LUMI_BLOCK_PIXELS], y[LUMI_BLOCK_PIXELS], z[LUMI_BLOCK_PIXELS];
-    float cast[5][LUMI_BLOCK_PIXELS];
+    float cast[CHANNELS][LUMI_BLOCK_PIXELS];
     float rays[CHANNELS][LUMI_BLOCK][LUMI_BLOCK]; /* a picture of what they see */
     float rows[CHANNELS][LUMI_BLOCK][TILE];       /* filtered along x */
     struct sums first, second;                    /* halves of the samples */
@@ -78,36 +78,44 @@ static float between(const struct prefilter_axis *axis, int *step)
     return (float)(axis->offset - *step);
 }
 
+/* A row of the surface between two of its own: LUMI_BLOCK + 1 values from pixel x0 on. */
+static void surface_row(const struct lumi_raster *surface, int x0, int y, float share, float *row)
+{
+    const float *top = lumi_row_f32(surface, held(y, surface->height));
+    const float *bottom = lumi_row_f32(surface, held(y + 1, surface->height));
+
+    for (int i = 0; i <= LUMI_BLOCK; i++) {
+        const int x = held(x0 + i, surface->width);
+        row[i] = top[x] + share * (bottom[x] - top[x]);
+    }
+}
+
 /* The rays of the block whose first pixel is (x0, y0): from the eye through the points of the view's own surface. */
 static void fill_rays(const struct work *work, const struct pass *pass, int x0, int y0, struct scratch *s)
 {
-    const struct lumi_raster *surface = work->view->surface;
     const float u = pass->sample.u, v = pass->sample.v;
-    int step_x, step_y, columns[2][LUMI_BLOCK];
+    int step_x, step_y;
     const float fx = between(&pass->sample.x, &step_x), fy = between(&pass->sample.y, &step_y);
-    float r[9];
+    const float *tan_x = pass->tan_x + x0 + MARGIN;
+    float r[9], row[LUMI_BLOCK + 1];
 
     for (int i = 0; i < 9; i++)
         r[i] = (float)work->view->pose.r[i];
-    for (int i = 0; i < LUMI_BLOCK; i++) {
-        columns[0][i] = held(x0 + i + step_x, surface->width);
-        columns[1][i] = held(x0 + i + step_x + 1, surface->width);
-    }
     for (int j = 0; j < LUMI_BLOCK; j++) {
-        const float *top = lumi_row_f32(surface, held(y0 + j + step_y, surface->height));
-        const float *bottom = lumi_row_f32(surface, held(y0 + j + step_y + 1, surface->height));
-        const float *tan_x = pass->tan_x + x0 + MARGIN, ty = pass->tan_y[y0 + j + MARGIN];
-        const size_t row =
-            (size_t)(j / LUMI_CELL * (LUMI_BLOCK / LUMI_CELL) * LUMI_CELL_PIXELS + j % LUMI_CELL * LUMI_CELL);
-        for (int i = 0; i < LUMI_BLOCK; i++) {
-            const int a = columns[0][i], b = columns[1][i];
-            const float up = top[a] + fx * (top[b] - top[a]), down = bottom[a] + fx * (bottom[b] - bottom[a]);
-            const float w = up + fy * (down - up), dx = tan_x[i] - w * u, dy = ty - w * v;
-            const float scale = 1 / sqrtf(dx * dx + dy * dy + 1);
-            const size_t at = row + (size_t)(i / LUMI_CELL * LUMI_CELL_PIXELS + i % LUMI_CELL);
-            s->x[at] = (r[0] * dx + r[1] * dy + r[2]) * scale;
-            s->y[at] = (r[3] * dx + r[4] * dy + r[5]) * scale;
-            s->z[at] = (r[6] * dx + r[7] * dy + r[8]) * scale;
+        const float ty = pass->tan_y[y0 + j + MARGIN];
+        surface_row(work->view->surface, x0 + step_x, y0 + j + step_y, fy, row);
+        for (int cell = 0; cell < LUMI_BLOCK / LUMI_CELL; cell++) {
+            const int first = cell * LUMI_CELL, place = (j / LUMI_CELL * (LUMI_BLOCK / LUMI_CELL) + cell);
+            float *x = s->x + place * LUMI_CELL_PIXELS + j % LUMI_CELL * LUMI_CELL;
+            float *y = s->y + (x - s->x), *z = s->z + (x - s->x);
+            for (int i = 0; i < LUMI_CELL; i++) {
+                const float a = row[first + i], w = a + fx * (row[first + i + 1] - a);
+                const float dx = tan_x[first + i] - w * u, dy = ty - w * v;
+                const float scale = 1 / sqrtf(dx * dx + dy * dy + 1);
+                x[i] = (r[0] * dx + r[1] * dy + r[2]) * scale;
+                y[i] = (r[3] * dx + r[4] * dy + r[5]) * scale;
+                z[i] = (r[6] * dx + r[7] * dy + r[8]) * scale;
+            }
         }
     }
 }
@@ -115,15 +123,20 @@ static void fill_rays(const struct work *work, const struct pass *pass, int x0, 
 /* What the rays see, out of the renderer's layout. */
 static void take_rays(struct scratch *s)
 {
-    for (int j = 0; j < LUMI_BLOCK; j++)
-        for (int i = 0; i < LUMI_BLOCK; i++) {
-            const int cell = j / LUMI_CELL * (LUMI_BLOCK / LUMI_CELL) + i / LUMI_CELL;
-            const int at = cell * LUMI_CELL_PIXELS + j % LUMI_CELL * LUMI_CELL + i % LUMI_CELL;
-            const float weight = s->cast[3][at], share = weight > 1e-6f ? 1 / weight : 0;
-            for (int c = 0; c < 3; c++)
-                s->rays[c][j][i] = s->cast[c][at] * share;
-            s->rays[3][j][i] = share > 0;
+    for (int row = 0; row < LUMI_BLOCK_PIXELS / LUMI_CELL; row++) {
+        const int cell = row / LUMI_CELL, at = row * LUMI_CELL;
+        const int j = cell / (LUMI_BLOCK / LUMI_CELL) * LUMI_CELL + row % LUMI_CELL;
+        const int first = cell % (LUMI_BLOCK / LUMI_CELL) * LUMI_CELL;
+        float share[LUMI_CELL];
+        for (int i = 0; i < LUMI_CELL; i++) {
+            const float weight = s->cast[3][at + i];
+            share[i] = weight > 1e-6f ? 1 / weight : 0;
+            s->rays[3][j][first + i] = weight > 1e-6f ? 1 : 0;
         }
+        for (int c = 0; c < 3; c++)
+            for (int i = 0; i < LUMI_CELL; i++)
+                s->rays[c][j][first + i] = s->cast[c][at + i] * share[i];
+    }
 }
 
 /* σ, along x and then y, and the sample's ρ. */
@@ -152,7 +165,7 @@ static void add_filtered(const struct prefilter_sample *sample, struct scratch *
 static void take_samples(const struct work *work, int x0, int y0, int first, int last, struct scratch *s,
                          struct sums *sums)
 {
-    struct lumi_sums cast = {s->cast[0], s->cast[1], s->cast[2], s->cast[3], s->cast[4]};
+    struct lumi_sums cast = {s->cast[0], s->cast[1], s->cast[2], s->cast[3], NULL};
 
     memset(sums, 0, sizeof *sums);
     for (int k = first; k < last; k++) {

@@ -183,30 +183,6 @@ void lumi_cast_eye_destroy(struct lumi_cast_eye *eye)
     lumi_free(eye);
 }
 
-/* What a cell's rays have in common about a view. */
-struct reach {
-    float ax[2], ay[2], u[2], v[2];
-};
-
-static void widen(float range[2], float value)
-{
-    range[0] = value < range[0] ? value : range[0];
-    range[1] = value > range[1] ? value : range[1];
-}
-
-static void reach_of(const struct cast_cell *cell, struct reach *reach)
-{
-    *reach = (struct reach){{FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}};
-    for (int i = 0; i < LUMI_CELL_PIXELS; i++) {
-        if (!(cell->weight[i] > 0))
-            continue;
-        widen(reach->ax, cell->ax[i]);
-        widen(reach->ay, cell->ay[i]);
-        widen(reach->u, cell->u[i]);
-        widen(reach->v, cell->v[i]);
-    }
-}
-
 static float pixel_of(const struct cast_axis *axis, float tangent)
 {
     float at = fminf(fmaxf((tangent - axis->origin) * axis->scale, 0), CAST_AXIS_CELLS - 1);
@@ -231,7 +207,8 @@ static bool bound_range(const struct cast_axis *axis, const float a[2], const fl
 }
 
 /* Narrows what is to be searched by the depths of the pixels that can be met; false where none can. */
-static bool narrow(const struct cast_view *view, const struct reach *reach, float nearest, struct cast_search *search)
+static bool narrow(const struct cast_view *view, const struct cast_reach *reach, float nearest,
+                   struct cast_search *search)
 {
     search->lo = fminf(view->all_lowest, nearest);
     search->hi = fminf(view->all_highest, nearest);
@@ -256,7 +233,7 @@ static bool narrow(const struct cast_view *view, const struct reach *reach, floa
     return true;
 }
 
-static void count_steps(const struct cast_view *view, const struct reach *reach, struct cast_search *search)
+static void count_steps(const struct cast_view *view, const struct cast_reach *reach, struct cast_search *search)
 {
     const float u = fmaxf(fabsf(reach->u[0]), fabsf(reach->u[1])), v = fmaxf(fabsf(reach->v[0]), fabsf(reach->v[1]));
     const float way = (search->hi - search->lo) * fmaxf(u * view->x->steepest, v * view->y->steepest);
@@ -264,10 +241,40 @@ static void count_steps(const struct cast_view *view, const struct reach *reach,
     search->steps = way <= 1 ? 0 : (int)fminf(ceilf(way), CAST_STEPS_MAX);
 }
 
-/* The least cone, as lumi_cone_around's but of a sum in eight parts. */
+#define LANES 8
+
+/* The smallest cone about the mean direction, or one that bounds nothing (as lumi_cone_around, in eight lanes). */
 static struct lumi_cone block_cone(const float *x, const float *y, const float *z)
 {
-    return lumi_cone_around(x, y, z, LUMI_BLOCK_PIXELS, 1);
+    float sx[LANES] = {0}, sy[LANES] = {0}, sz[LANES] = {0}, least[LANES];
+    float cx = 0, cy = 0, cz = 0, cosine = 1;
+
+    for (int i = 0; i < LUMI_BLOCK_PIXELS; i += LANES)
+        for (int k = 0; k < LANES; k++) {
+            sx[k] += x[i + k];
+            sy[k] += y[i + k];
+            sz[k] += z[i + k];
+        }
+    for (int k = 0; k < LANES; k++)
+        cx += sx[k], cy += sy[k], cz += sz[k];
+    const float length = sqrtf(cx * cx + cy * cy + cz * cz);
+    if (!(length > 0))
+        return (struct lumi_cone){0, 0, 1, -1, 2};
+    cx /= length, cy /= length, cz /= length;
+    for (int k = 0; k < LANES; k++)
+        least[k] = 1;
+    for (int i = 0; i < LUMI_BLOCK_PIXELS; i += LANES)
+        for (int k = 0; k < LANES; k++) {
+            const float dot = x[i + k] * cx + y[i + k] * cy + z[i + k] * cz;
+            least[k] = dot < least[k] ? dot : least[k];
+        }
+    for (int k = 0; k < LANES; k++)
+        cosine = fminf(cosine, least[k]);
+    /* Rays that are none have dot 0, and bound nothing either. */
+    if (cosine < 0.1f)
+        return (struct lumi_cone){0, 0, 1, -1, 2};
+    const float sine = sqrtf(fmaxf(0, 1 - cosine * cosine)) + 1e-4f;
+    return (struct lumi_cone){cx, cy, cz, sqrtf(fmaxf(0, 1 - sine * sine)), sine};
 }
 
 static void cast_cell(const struct lumi_cast *cast, const struct cast_view *view, const struct lumi_surface_view *place,
@@ -275,11 +282,10 @@ static void cast_cell(const struct lumi_cast *cast, const struct cast_view *view
 {
     struct cast_cell cell;
     struct cast_search search;
-    struct reach reach;
+    struct cast_reach reach;
 
-    if (!cast->kernels->cross(place, &cast->disk, x + at, y + at, z + at, &cell))
+    if (!cast->kernels->cross(place, &cast->disk, x + at, y + at, z + at, &cell, &reach))
         return;
-    reach_of(&cell, &reach);
     /* What is met lies ahead of the eye. */
     const float nearest = place->ez > 0 ? 0.999f / place->ez : FLT_MAX;
     if (!narrow(view, &reach, nearest, &search))
@@ -287,7 +293,7 @@ static void cast_cell(const struct lumi_cast *cast, const struct cast_view *view
     count_steps(view, &reach, &search);
     cast->kernels->meet(view, &search, cast->disk.stretch, &cell);
     cast->kernels->shade(view, cast->filter, &cell, sums, at);
-    for (int i = 0; i < LUMI_CELL_PIXELS; i++) {
+    for (int i = 0; sums->nearness && i < LUMI_CELL_PIXELS; i++) {
         const size_t k = at + (size_t)i;
         if (!(cell.weight[i] > 0))
             continue;

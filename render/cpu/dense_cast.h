@@ -33,7 +33,7 @@ int lumi_cast_eye_create(const struct lumi_cast *cast, struct lumi_vec3 eye, str
 void lumi_cast_eye_destroy(struct lumi_cast_eye *eye);
 
 /* Adds to `sums` what the rays of one block see, directions and sums in the block's layout (rays.h): unit directions in
- * the world, zero where there is no ray. */
+ * the world, zero where there is no ray. sums->nearness may be NULL. */
 void lumi_cast_block(const struct lumi_cast *cast, const struct lumi_cast_eye *eye, const float *x, const float *y,
                      const float *z, struct lumi_sums *sums);
 

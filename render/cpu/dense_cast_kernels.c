@@ -1,14 +1,22 @@
 /* The kernels of casting in plain C: the definition of what the variants compute. */
 #include "render/cpu/dense_cast_priv.h"
 
+#include <float.h>
 #include <math.h>
 
+static void widen(float range[2], float value)
+{
+    range[0] = value < range[0] ? value : range[0];
+    range[1] = value > range[1] ? value : range[1];
+}
+
 static bool cross(const struct lumi_surface_view *place, const struct cast_disk *disk, const float *x, const float *y,
-                  const float *z, struct cast_cell *cell)
+                  const float *z, struct cast_cell *cell, struct cast_reach *reach)
 {
     const float *r = place->rt;
     bool any = false;
 
+    *reach = (struct cast_reach){{FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}, {FLT_MAX, -FLT_MAX}};
     for (int i = 0; i < LUMI_CELL_PIXELS; i++) {
         float cx = r[0] * x[i] + r[1] * y[i] + r[2] * z[i], cy = r[3] * x[i] + r[4] * y[i] + r[5] * z[i];
         float cz = r[6] * x[i] + r[7] * y[i] + r[8] * z[i];
@@ -21,7 +29,13 @@ static bool cross(const struct lumi_surface_view *place, const struct cast_disk 
         cell->weight[i] =
             ahead ? lumi_disk_weight(&place->view->disk, disk->shape, disk->kernel, disk->scale, cell->u[i], cell->v[i])
                   : 0;
-        any |= cell->weight[i] > 0;
+        if (!(cell->weight[i] > 0))
+            continue;
+        any = true;
+        widen(reach->ax, cell->ax[i]);
+        widen(reach->ay, cell->ay[i]);
+        widen(reach->u, cell->u[i]);
+        widen(reach->v, cell->v[i]);
     }
     return any;
 }
@@ -132,5 +146,9 @@ const struct cast_kernels cast_kernels_c = {cross, meet, shade};
 
 const struct cast_kernels *cast_kernels(void)
 {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        return &cast_kernels_avx2;
+#endif
     return &cast_kernels_c;
 }

@@ -28,6 +28,11 @@ struct cast_view {
     struct cast_axis *x, *y;
 };
 
+/* Lowest and highest of the rays with weight. */
+struct cast_reach {
+    float ax[2], ay[2], u[2], v[2];
+};
+
 /* The rays of a cell about one view. */
 struct cast_cell {
     float ax[LUMI_CELL_PIXELS], ay[LUMI_CELL_PIXELS]; /* tangents of the direction in the view */
@@ -51,9 +56,9 @@ struct cast_disk {
 
 /* The kernels; x86/ has variants that give the same numbers. */
 struct cast_kernels {
-    /* Fills ax, ay, u, v and weight; false where no weight is above 0. */
+    /* Fills ax, ay, u, v and weight, and their reach; false where no weight is above 0. */
     bool (*cross)(const struct lumi_surface_view *place, const struct cast_disk *disk, const float *x, const float *y,
-                  const float *z, struct cast_cell *cell);
+                  const float *z, struct cast_cell *cell, struct cast_reach *reach);
     /* Fills w, px and py and lowers weights by the stretch, to 0 where nothing of the view is met. */
     void (*meet)(const struct cast_view *view, const struct cast_search *search, float stretch, struct cast_cell *cell);
     /* Adds to the sums' r, g, b and weight, from place `at`. */
