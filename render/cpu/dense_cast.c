@@ -36,7 +36,13 @@ static void fill_axis(struct cast_axis *axis, const struct lumi_grid *grid, bool
         const double p0 = vertical ? y0 : x0, p1 = vertical ? y1 : x1, slope = (p1 - p0) / cell;
         axis->slope[i] = (float)slope;
         axis->offset[i] = (float)(p0 - slope * t0);
-        axis->steepest = fmaxf(axis->steepest, (float)slope);
+    }
+    axis->tiles = tiles;
+    for (int i = 0; i < tiles; i++) {
+        const double slope = LUMI_TILE / (tangents[i + 1] - tangents[i]);
+        axis->tile_tangent[i] = (float)tangents[i];
+        axis->tile_slope[i] = (float)slope;
+        axis->tile_offset[i] = (float)(LUMI_TILE * i - slope * tangents[i]);
     }
 }
 
@@ -190,38 +196,39 @@ static float pixel_of(const struct cast_axis *axis, float tangent)
     return axis->offset[(int)at] + axis->slope[(int)at] * tangent;
 }
 
-/* The cells of bounds that tangents a + w · b, w in [lo, hi], can fall into; false where they miss the image. */
-static bool bound_range(const struct cast_axis *axis, const float a[2], const float b[2], float lo, float hi, int size,
-                        int range[2])
+/* First and last pixel of tangents a + w · b, w in [lo, hi]; false where they miss the image. */
+static bool pixel_range(const struct cast_axis *axis, const float a[2], const float b[2],
+                        const struct cast_search *search, int size, float range[2])
 {
-    float low = a[0] + fminf(lo * b[0], hi * b[0]), high = a[1] + fmaxf(lo * b[1], hi * b[1]);
-    float first = pixel_of(axis, low), last = pixel_of(axis, high);
+    const float low = a[0] + fminf(search->lo * b[0], search->hi * b[0]);
+    const float high = a[1] + fmaxf(search->lo * b[1], search->hi * b[1]);
 
-    if (last < 0 || first > (float)size)
+    range[0] = pixel_of(axis, low);
+    range[1] = pixel_of(axis, high);
+    if (range[1] < 0 || range[0] > (float)size)
         return false;
-    first = fminf(fmaxf(first, 0), (float)size - 1);
-    last = fminf(fmaxf(last, 0), (float)size - 1);
-    range[0] = (int)first / CAST_BOUND;
-    range[1] = (int)last / CAST_BOUND;
+    range[0] = fminf(fmaxf(range[0], 0), (float)size - 1);
+    range[1] = fminf(fmaxf(range[1], 0), (float)size - 1);
     return true;
 }
 
-/* Narrows what is to be searched by the depths of the pixels that can be met; false where none can. */
+/* Narrows what is to be searched by the depths of the pixels that can be met, whose first and last are left in x and y;
+ * false where none can. */
 static bool narrow(const struct cast_view *view, const struct cast_reach *reach, float nearest,
-                   struct cast_search *search)
+                   struct cast_search *search, float x[2], float y[2])
 {
     search->lo = fminf(view->all_lowest, nearest);
     search->hi = fminf(view->all_highest, nearest);
     for (int round = 0; round < 4; round++) {
-        int cols[2], rows[2];
-        if (!bound_range(view->x, reach->ax, reach->u, search->lo, search->hi, view->width, cols) ||
-            !bound_range(view->y, reach->ay, reach->v, search->lo, search->hi, view->height, rows))
+        if (!pixel_range(view->x, reach->ax, reach->u, search, view->width, x) ||
+            !pixel_range(view->y, reach->ay, reach->v, search, view->height, y))
             return false;
         float lo = FLT_MAX, hi = 0;
-        for (int r = rows[0]; r <= rows[1]; r++)
-            for (int c = cols[0]; c <= cols[1]; c++) {
-                lo = fminf(lo, view->lowest[r * view->bound_cols + c]);
-                hi = fmaxf(hi, view->highest[r * view->bound_cols + c]);
+        for (int r = (int)y[0] / CAST_BOUND; r <= (int)y[1] / CAST_BOUND; r++)
+            for (int c = (int)x[0] / CAST_BOUND; c <= (int)x[1] / CAST_BOUND; c++) {
+                const int at = r * view->bound_cols + c;
+                lo = view->lowest[at] < lo ? view->lowest[at] : lo;
+                hi = view->highest[at] > hi ? view->highest[at] : hi;
             }
         lo = fmaxf(lo, search->lo);
         hi = fmaxf(fminf(hi, search->hi), lo);
@@ -233,12 +240,31 @@ static bool narrow(const struct cast_view *view, const struct cast_reach *reach,
     return true;
 }
 
-static void count_steps(const struct cast_view *view, const struct cast_reach *reach, struct cast_search *search)
+/* The lines of the tiles that a range of pixels lies in; returns the steeper slope. */
+static float find_lines(const struct cast_axis *axis, const float range[2], struct cast_lines *lines)
+{
+    const int first = (int)range[0] / LUMI_TILE, last = (int)range[1] / LUMI_TILE;
+    float steepest = 0;
+
+    *lines = (struct cast_lines){.hold = last <= first + 1,
+                                 .border = axis->tile_tangent[last],
+                                 .offset = {axis->tile_offset[first], axis->tile_offset[last]},
+                                 .slope = {axis->tile_slope[first], axis->tile_slope[last]}};
+    for (int i = first; i <= last; i++)
+        steepest = fmaxf(steepest, axis->tile_slope[i]);
+    return steepest;
+}
+
+/* How the search is done: by steps of a pixel, or, where all lies within one, by looking where the depth says. */
+static void plan_search(const struct cast_view *view, const struct cast_reach *reach, const float x[2],
+                        const float y[2], struct cast_search *search)
 {
     const float u = fmaxf(fabsf(reach->u[0]), fabsf(reach->u[1])), v = fmaxf(fabsf(reach->v[0]), fabsf(reach->v[1]));
-    const float way = (search->hi - search->lo) * fmaxf(u * view->x->steepest, v * view->y->steepest);
+    const float steep_x = find_lines(view->x, x, &search->x), steep_y = find_lines(view->y, y, &search->y);
+    const float way = (search->hi - search->lo) * fmaxf(u * steep_x, v * steep_y);
 
     search->steps = way <= 1 ? 0 : (int)fminf(ceilf(way), CAST_STEPS_MAX);
+    search->looks = way <= 0.5f ? 1 : 2;
 }
 
 #define LANES 8
@@ -283,14 +309,15 @@ static void cast_cell(const struct lumi_cast *cast, const struct cast_view *view
     struct cast_cell cell;
     struct cast_search search;
     struct cast_reach reach;
+    float px[2], py[2];
 
     if (!cast->kernels->cross(place, &cast->disk, x + at, y + at, z + at, &cell, &reach))
         return;
     /* What is met lies ahead of the eye. */
     const float nearest = place->ez > 0 ? 0.999f / place->ez : FLT_MAX;
-    if (!narrow(view, &reach, nearest, &search))
+    if (!narrow(view, &reach, nearest, &search, px, py))
         return;
-    count_steps(view, &reach, &search);
+    plan_search(view, &reach, px, py, &search);
     cast->kernels->meet(view, &search, cast->disk.stretch, &cell);
     cast->kernels->shade(view, cast->filter, &cell, sums, at);
     for (int i = 0; sums->nearness && i < LUMI_CELL_PIXELS; i++) {

@@ -40,10 +40,14 @@ static bool cross(const struct lumi_surface_view *place, const struct cast_disk 
     return any;
 }
 
-static float position(const struct cast_axis *axis, float tangent, float *slope)
+static float position(const struct cast_axis *axis, const struct cast_lines *lines, float tangent, float *slope)
 {
+    if (lines->hold) {
+        const int side = tangent < lines->border ? 0 : 1;
+        *slope = lines->slope[side];
+        return lines->offset[side] + *slope * tangent;
+    }
     float at = (tangent - axis->origin) * axis->scale;
-
     at = at > 0 ? at : 0;
     at = at < CAST_AXIS_CELLS - 1 ? at : CAST_AXIS_CELLS - 1;
     *slope = axis->slope[(int)at];
@@ -56,10 +60,10 @@ struct look {
     float w00, w10, w01, w11, fx, fy;
 };
 
-static float look(const struct cast_view *view, float tx, float ty, struct look *l)
+static float look(const struct cast_view *view, const struct cast_search *search, float tx, float ty, struct look *l)
 {
-    l->px = position(view->x, tx, &l->slope_x);
-    l->py = position(view->y, ty, &l->slope_y);
+    l->px = position(view->x, &search->x, tx, &l->slope_x);
+    l->py = position(view->y, &search->y, ty, &l->slope_y);
     float x = l->px - 0.5f, y = l->py - 0.5f;
     x = x > 0 ? x : 0;
     y = y > 0 ? y : 0;
@@ -82,13 +86,14 @@ static float find(const struct cast_view *view, const struct cast_search *search
 
     if (search->steps == 0) {
         float w = 0.5f * (search->lo + search->hi);
-        w = look(view, ax + w * u, ay + w * v, &l);
-        return look(view, ax + w * u, ay + w * v, &l);
+        for (int i = 0; i < search->looks; i++)
+            w = look(view, search, ax + w * u, ay + w * v, &l);
+        return w;
     }
     const float step = (search->hi - search->lo) / (float)search->steps;
-    float near = search->hi, before = look(view, ax + near * u, ay + near * v, &l) - near;
+    float near = search->hi, before = look(view, search, ax + near * u, ay + near * v, &l) - near;
     for (int k = 1; k <= search->steps; k++) {
-        float w = search->hi - (float)k * step, gap = look(view, ax + w * u, ay + w * v, &l) - w;
+        float w = search->hi - (float)k * step, gap = look(view, search, ax + w * u, ay + w * v, &l) - w;
         if (gap >= 0) {
             float span = before - gap, share = span < 0 ? before / span : 0;
             share = share > 0 ? share : 0;
@@ -108,7 +113,7 @@ static void meet(const struct cast_view *view, const struct cast_search *search,
         if (!(cell->weight[i] > 0))
             continue;
         float w = find(view, search, cell->ax[i], cell->ay[i], u, v);
-        look(view, cell->ax[i] + w * u, cell->ay[i] + w * v, &l);
+        look(view, search, cell->ax[i] + w * u, cell->ay[i] + w * v, &l);
         bool inside = l.px >= 0 && l.py >= 0 && l.px <= (float)view->width && l.py <= (float)view->height;
         /* As stretch_factor of view_shade.c, with the slope of the bilinear depth at the point. */
         float left = l.w10 - l.w00, right = l.w11 - l.w01, up = l.w01 - l.w00, down = l.w11 - l.w10;

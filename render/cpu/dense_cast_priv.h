@@ -14,7 +14,14 @@
 struct cast_axis {
     float origin, scale; /* cell = (tangent − origin) · scale, held to the table */
     float offset[CAST_AXIS_CELLS], slope[CAST_AXIS_CELLS];
-    float steepest; /* pixels a unit of tangent */
+    int tiles; /* within each the grid itself is straight */
+    float tile_tangent[LUMI_GRID_MAX + 1], tile_offset[LUMI_GRID_MAX], tile_slope[LUMI_GRID_MAX];
+};
+
+/* Pixel of a tangent where at most two tiles are met: one line up to the border between them, the other from there. */
+struct cast_lines {
+    bool hold; /* false: more tiles, look into the axis */
+    float border, offset[2], slope[2];
 };
 
 struct cast_view {
@@ -42,10 +49,12 @@ struct cast_cell {
     float px[LUMI_CELL_PIXELS], py[LUMI_CELL_PIXELS]; /* where, in pixels */
 };
 
-/* Where the search begins and ends (lo < hi or equal), in so many steps; 0: two looks at the depth are enough. */
+/* Where the search begins and ends (lo < hi or equal), in so many steps; 0: so many looks at the depth, each where the
+ * last one says, lead there. */
 struct cast_search {
     float lo, hi;
-    int steps;
+    int steps, looks;
+    struct cast_lines x, y;
 };
 
 struct cast_disk {

@@ -104,8 +104,16 @@ static bool cross(const struct lumi_surface_view *place, const struct cast_disk 
     return any != 0;
 }
 
-static inline __m256 position(const struct cast_axis *axis, __m256 tangent, __m256 *slope)
+static inline __m256 position(const struct cast_axis *axis, const struct cast_lines *lines, __m256 tangent,
+                              __m256 *slope)
 {
+    if (lines->hold) {
+        const __m256 first = _mm256_cmp_ps(tangent, _mm256_set1_ps(lines->border), _CMP_LT_OQ);
+        *slope = _mm256_blendv_ps(_mm256_set1_ps(lines->slope[1]), _mm256_set1_ps(lines->slope[0]), first);
+        const __m256 offset =
+            _mm256_blendv_ps(_mm256_set1_ps(lines->offset[1]), _mm256_set1_ps(lines->offset[0]), first);
+        return _mm256_add_ps(offset, _mm256_mul_ps(*slope, tangent));
+    }
     __m256 at = _mm256_mul_ps(_mm256_sub_ps(tangent, _mm256_set1_ps(axis->origin)), _mm256_set1_ps(axis->scale));
 
     /* max gives its second operand, 0, for what is not a number */
@@ -136,10 +144,11 @@ static inline __m256 mix(__m256 a, __m256 b, __m256 share)
     return _mm256_add_ps(a, _mm256_mul_ps(share, _mm256_sub_ps(b, a)));
 }
 
-static inline __m256 look(const struct cast_view *view, __m256 tx, __m256 ty, struct look *l)
+static inline __m256 look(const struct cast_view *view, const struct cast_search *search, __m256 tx, __m256 ty,
+                          struct look *l)
 {
-    l->px = position(view->x, tx, &l->slope_x);
-    l->py = position(view->y, ty, &l->slope_y);
+    l->px = position(view->x, &search->x, tx, &l->slope_x);
+    l->py = position(view->y, &search->y, ty, &l->slope_y);
     const __m256i ix = before(l->px, view->width, &l->fx), iy = before(l->py, view->height, &l->fy);
     const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(iy, _mm256_set1_epi32(view->pitch)), ix);
     l->w00 = _mm256_i32gather_ps(view->depth, at, 4);
@@ -154,9 +163,11 @@ struct eight {
     __m256 ax, ay, u, v;
 };
 
-static inline __m256 look_at(const struct cast_view *view, const struct eight *e, __m256 w, struct look *l)
+static inline __m256 look_at(const struct cast_view *view, const struct cast_search *search, const struct eight *e,
+                             __m256 w, struct look *l)
 {
-    return look(view, _mm256_add_ps(e->ax, _mm256_mul_ps(w, e->u)), _mm256_add_ps(e->ay, _mm256_mul_ps(w, e->v)), l);
+    return look(view, search, _mm256_add_ps(e->ax, _mm256_mul_ps(w, e->u)),
+                _mm256_add_ps(e->ay, _mm256_mul_ps(w, e->v)), l);
 }
 
 static inline __m256 find(const struct cast_view *view, const struct cast_search *search, const struct eight *e,
@@ -165,14 +176,18 @@ static inline __m256 find(const struct cast_view *view, const struct cast_search
     const __m256 zero = _mm256_setzero_ps();
     struct look l;
 
-    if (search->steps == 0)
-        return look_at(view, e, look_at(view, e, _mm256_set1_ps(0.5f * (search->lo + search->hi)), &l), &l);
+    if (search->steps == 0) {
+        __m256 w = _mm256_set1_ps(0.5f * (search->lo + search->hi));
+        for (int i = 0; i < search->looks; i++)
+            w = look_at(view, search, e, w, &l);
+        return w;
+    }
     const float step = (search->hi - search->lo) / (float)search->steps;
     __m256 result = _mm256_set1_ps(search->lo), open = counts, near = _mm256_set1_ps(search->hi);
-    __m256 last = _mm256_sub_ps(look_at(view, e, near, &l), near);
+    __m256 last = _mm256_sub_ps(look_at(view, search, e, near, &l), near);
     for (int k = 1; k <= search->steps && _mm256_movemask_ps(open); k++) {
         const __m256 w = _mm256_set1_ps(search->hi - (float)k * step);
-        const __m256 gap = _mm256_sub_ps(look_at(view, e, w, &l), w);
+        const __m256 gap = _mm256_sub_ps(look_at(view, search, e, w, &l), w);
         const __m256 met = _mm256_and_ps(open, _mm256_cmp_ps(gap, zero, _CMP_GE_OQ));
         if (_mm256_movemask_ps(met)) {
             const __m256 span = _mm256_sub_ps(last, gap);
@@ -221,7 +236,7 @@ static void meet(const struct cast_view *view, const struct cast_search *search,
         const struct eight e = {_mm256_loadu_ps(cell->ax + i), _mm256_loadu_ps(cell->ay + i),
                                 _mm256_loadu_ps(cell->u + i), _mm256_loadu_ps(cell->v + i)};
         const __m256 w = find(view, search, &e, counts);
-        look_at(view, &e, w, &l);
+        look_at(view, search, &e, w, &l);
         const __m256 left = _mm256_mul_ps(weight, stretch_factor(&l, &e, stretch));
         _mm256_storeu_ps(cell->w + i, w);
         _mm256_storeu_ps(cell->px + i, l.px);
