@@ -311,12 +311,14 @@ static void summarise(const struct work *work, int tiles, struct lumi_prefilter_
         pixels += tile->pixels;
         report->samples += (double)tile->pixels * tile->samples;
         report->error += (double)tile->pixels * tile->error;
+        report->rms += (double)tile->pixels * tile->error * tile->error;
         report->over += tile->error > work->settings->tolerance ? tile->pixels : 0;
         report->uncovered += tile->uncovered;
         report->worst = fmax(report->worst, tile->error);
     }
     report->samples /= pixels;
     report->error /= pixels;
+    report->rms = sqrt(report->rms / pixels);
     report->over /= pixels;
     report->uncovered /= pixels;
 }

@@ -5,8 +5,8 @@
 
 #include "render/viewset/viewset.h"
 
-#define LUMI_PREFILTER_BASE 8  /* samples every pixel takes where nothing else is said */
-#define LUMI_PREFILTER_MOST 64 /* and the most, where the first ones disagree */
+#define LUMI_PREFILTER_BASE 4  /* samples every pixel takes where nothing else is said */
+#define LUMI_PREFILTER_MOST 32 /* and the most, where the first ones disagree */
 
 /* What is filtered. */
 struct lumi_prefilter_view {
@@ -32,6 +32,7 @@ void lumi_prefilter_defaults(struct lumi_prefilter_settings *settings);
 struct lumi_prefilter_report {
     double samples;   /* a pixel, on average */
     double error;     /* standard error as estimated, mean over the pixels */
+    double rms;       /* the same, root mean square */
     double over;      /* share of the pixels whose block stays over the tolerance */
     double worst;     /* standard error of the worst block */
     double uncovered; /* share of the pixels that no dense view sees */

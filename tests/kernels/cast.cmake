@@ -1,0 +1,1 @@
+lumi_test(test_cast_kernels FOLDERS cpu viewset lightfield base)

@@ -1,0 +1,1 @@
+lumi_test(test_prefilter FOLDERS prefilter cpu viewset lightfield base LABELS threads)
