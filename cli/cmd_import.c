@@ -13,7 +13,7 @@ static char *output, *images, *every, *flip;
 static int limit, threads;
 static double unit, focal, fov, plane;
 static gboolean trust, strict;
-static char *rig_name, *plan_path, *brackets, **cameras;
+static char *rig_name, *plan_path, *brackets, *marks, **cameras;
 
 static const GOptionEntry options[] = {
     {"output", 'o', 0, G_OPTION_ARG_FILENAME, &output, "the capture to make (needed)", "CAPTURE"},
@@ -36,6 +36,9 @@ static const GOptionEntry options[] = {
      "FILE"},
     {"brackets", 0, 0, G_OPTION_ARG_STRING, &brackets,
      "stops of the shots at every position, in their order (found from the exposures)", "-2,0,2"},
+    {"marks", 0, 0, G_OPTION_ARG_STRING, &marks,
+     "videos: when the first turn begins and the last ends, in seconds of the first camera's (by the rig's lamp)",
+     "BEGIN,END"},
     {"strict", 0, 0, G_OPTION_ARG_NONE, &strict, "with --rig: whatever is missing or damaged is an error", NULL},
     {"trust", 0, 0, G_OPTION_ARG_NONE, &trust, "do not decode every picture to see whether it is whole", NULL},
     {"threads", 'j', 0, G_OPTION_ARG_INT, &threads, "threads (all)", "N"},
@@ -80,6 +83,16 @@ static int read_brackets(struct lumi_ingest_options *ingest, struct lumi_error *
     return LUMI_OK;
 }
 
+static int read_marks(struct lumi_ingest_options *ingest, struct lumi_error *error)
+{
+    if (!marks)
+        return LUMI_OK;
+    LUMI_TRY(cli_parse_doubles("--marks", marks, ',', 2, ingest->marks, error));
+    if (!(ingest->marks[0] >= 0 && ingest->marks[1] > ingest->marks[0] && ingest->marks[1] < 1e6))
+        return lumi_fail(error, LUMI_ERR_ARG, "--marks %s: two times in seconds wanted, the second later", marks);
+    return LUMI_OK;
+}
+
 /* NAME=FOLDER; the texts are split in place. */
 static int read_cameras(struct lumi_ingest_source *sources, struct lumi_ingest_options *ingest,
                         struct lumi_error *error)
@@ -117,6 +130,7 @@ static int run_ingest(const char *folder, const char *date, struct lumi_error *e
         ingest.plan = &plan;
     }
     LUMI_TRY(read_brackets(&ingest, error));
+    LUMI_TRY(read_marks(&ingest, error));
     LUMI_TRY(read_cameras(sources, &ingest, error));
     if (!folder && ingest.source_count == 0)
         return lumi_fail(error, LUMI_ERR_ARG, "from where? SOURCE or --camera NAME=FOLDER is needed");
@@ -170,8 +184,9 @@ static int run_import(int argc, char **argv, struct lumi_error *error)
                          "--focal, --fov and --plane");
     if (rig_name)
         return run_ingest(argc > 0 ? argv[0] : NULL, date, error);
-    if (cameras || plan_path || brackets || strict)
-        return lumi_fail(error, LUMI_ERR_ARG, "--camera, --plan, --brackets and --strict want a rig: --rig PROFILE");
+    if (cameras || plan_path || brackets || marks || strict)
+        return lumi_fail(error, LUMI_ERR_ARG,
+                         "--camera, --plan, --brackets, --marks and --strict want a rig: --rig PROFILE");
     if (argc < 1)
         return lumi_fail(error, LUMI_ERR_ARG, "from where? SOURCE is needed");
     return run_list(argv[0], date, error);
@@ -180,7 +195,7 @@ static int run_import(int argc, char **argv, struct lumi_error *error)
 const struct cli_command cli_import = {
     .name = "import",
     .arguments = "[SOURCE] -o CAPTURE",
-    .summary = "make a capture from pictures with poses, or from a rig's memory cards",
+    .summary = "make a capture from pictures with poses, or from the cards or videos of a rig",
     .description =
         "SOURCE is a nerfstudio transforms.json, a folder with a COLMAP model (cameras and images, .bin or .txt; its "
         "pictures are looked for in images/ beside it, or where --images says), or a folder of pictures named as in "
@@ -188,7 +203,8 @@ const struct cli_command cli_import = {
         "Stanford Light Field Archive (out_ROW_COLUMN_Y_X.png). Pictures are copied byte for byte.\n\n"
         "With --rig SOURCE is a folder with a sub-folder for each camera of the rig, called as in its profile: what "
         "lay on "
-        "its memory card. The pictures are matched to the sweep's shots by their order and the times in them; the "
+        "its memory card, or a video (NAME.mp4). Pictures are matched to the sweep's shots by their order and the "
+        "times in them; the "
         "cameras' clocks may differ. What is missing, too much or damaged is said in a line each, kept in the capture, "
         "and the rest imported; poses are those of the rig's mechanism.\n\n"
         "Exit status 3 with one line for pictures that are missing, damaged, of another size than their camera, or two "

@@ -233,11 +233,8 @@ static int match_cards(struct ingest *ingest, struct lumi_shot_camera *cameras, 
     if (ingest->options->bracket < 1)
         find_bracket(ingest, cameras);
     ingest->shots.shots = ingest->plan.positions * ingest->plan.turns * ingest->shots.bracket;
-    for (int c = 0; c < ingest->camera_count; c++) {
-        ingest->cameras[c].frames = g_new0(struct ingest_frame, ingest->shots.shots);
-        for (int s = 0; s < ingest->shots.shots; s++)
-            ingest->cameras[c].frames[s] = (struct ingest_frame){.file = -1, .turns = NAN};
-    }
+    for (int c = 0; c < ingest->camera_count; c++)
+        ingest_make_frames(ingest, c);
     return lumi_shot_match(&ingest->shots, cameras, ingest->camera_count, error);
 }
 
@@ -254,7 +251,7 @@ static void find_begin(struct ingest *ingest)
 }
 
 static int store_file(struct ingest *ingest, struct lumi_capture *capture, int c, int shot, int64_t frame,
-                      char **refused, struct lumi_error *error)
+                      struct lumi_error *error)
 {
     static const char *const canonical[] = {"", ".jpg", ".png", ".tif", ".exr", ".dng"};
     const struct lumi_card_file *source =
@@ -272,7 +269,6 @@ static int store_file(struct ingest *ingest, struct lumi_capture *capture, int c
         .exif_size = meta->exif_size,
         .label = source->path};
 
-    (void)refused;
     return lumi_capture_store_file(capture, frame, source->path, &file, error);
 }
 

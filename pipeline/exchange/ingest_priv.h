@@ -37,11 +37,11 @@ struct ingest {
     struct lumi_shot_plan shots;
     int64_t begin_us; /* what times of items are counted from; LUMI_NO_TIME */
     GArray *findings; /* struct ingest_finding */
+    bool videos;
     const char *what; /* "cards", "videos" */
-    /* Stores the picture of a camera's shot in its frame; a picture that turns out to be none: LUMI_OK, and
-     * *refused, to be released with g_free. */
+    /* Stores the picture of a camera's shot in its frame. */
     int (*store)(struct ingest *ingest, struct lumi_capture *capture, int camera, int shot, int64_t frame,
-                 char **refused, struct lumi_error *error);
+                 struct lumi_error *error);
 };
 
 struct ingest_finding {
@@ -65,6 +65,11 @@ int ingest_fit_lens(struct ingest *ingest, int camera, int width, int height, co
 
 /* Cards: read, matched, findings made. */
 int ingest_cards(struct ingest *ingest, struct lumi_error *error);
+
+/* Room for a frame a shot, none with a picture. */
+void ingest_make_frames(struct ingest *ingest, int camera);
+/* For sorting doubles. */
+int ingest_by_value(const void *a, const void *b);
 
 /* All rows and files of the capture. */
 int ingest_write(struct ingest *ingest, struct lumi_capture *capture, struct lumi_error *error);

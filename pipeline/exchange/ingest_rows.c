@@ -1,5 +1,5 @@
 /* The capture of an import: lenses, cameras, positions, shots, a row for every frame, poses from the mechanism. */
-#include "pipeline/exchange/ingest_priv.h"
+#include "pipeline/exchange/ingest_film.h"
 
 #include "proto/base/memory.h"
 #include "proto/mechanism/kinematics.h"
@@ -185,21 +185,46 @@ static int add_clocks(struct ingest *ingest, struct lumi_capture *capture, struc
 
 /* Frames */
 
+/* "DCIM/100CANON/IMG_0001.JPG", "left.mp4@12.345678"; g_free. */
+static char *source_name(const struct ingest_camera *camera, const struct ingest_frame *source)
+{
+    if (source->file < 0)
+        return NULL;
+    if (!camera->video)
+        return g_strdup(lumi_card_file(&camera->card, source->file)->name);
+    g_autofree char *base = g_path_get_basename(camera->path);
+    return g_strdup_printf("%s@%.6f", base,
+                           g_array_index(camera->film->pictures, struct ingest_picture, source->file).time);
+}
+
+static int add_pose(struct ingest *ingest, struct lumi_capture *capture, int c, const struct ingest_frame *source,
+                    const struct lumi_capture_position *place, int64_t frame, struct lumi_error *error)
+{
+    g_autofree char *origin = NULL;
+    struct lumi_pose pose;
+
+    if (isfinite(source->turns)) {
+        lumi_rig_camera_pose(&ingest->rig, c, source->turns, &pose);
+        origin = g_strdup_printf("the rig's profile at %.6f turns, from video", source->turns);
+    } else {
+        lumi_rig_camera_pose_at(&ingest->rig, c, place->turn_angle, place->drop, &pose);
+    }
+    return lumi_capture_set_pose(capture, frame, &pose, LUMI_POSE_PRIOR, origin ? origin : "the rig's profile", error);
+}
+
 static int add_frame(struct ingest *ingest, struct lumi_capture *capture, int c, int shot, int64_t shot_id,
                      const struct lumi_capture_position *place, struct lumi_error *error)
 {
     const struct ingest_camera *camera = &ingest->cameras[c];
     const struct ingest_frame *source = &camera->frames[shot];
     int in_turn = place->number % ingest->plan.positions, bracket = ingest->shots.bracket;
+    g_autofree char *original = source_name(camera, source);
     char name[LUMI_CAPTURE_NAME], suffix[16] = "";
-    g_autofree char *refused = NULL, *origin = NULL;
-    struct lumi_pose pose;
     int64_t id;
 
     if (bracket > 1)
         snprintf(suffix, sizeof suffix, "-b%d", shot % bracket);
     snprintf(name, sizeof name, "c%02d-t%02d-p%03d%s", c, place->turn, in_turn, suffix);
-    const char *original = source->file < 0 || camera->video ? NULL : lumi_card_file(&camera->card, source->file)->name;
     const struct lumi_capture_new_frame frame = {
         .name = name,
         .original = original,
@@ -209,20 +234,11 @@ static int add_frame(struct ingest *ingest, struct lumi_capture *capture, int c,
         .column = lumi_rig_column(&ingest->rig, c, in_turn)};
     LUMI_TRY(lumi_capture_add_frame(capture, &frame, &id, error));
     if (source->file >= 0)
-        LUMI_TRY(ingest->store(ingest, capture, c, shot, id, &refused, error));
-    if (source->file < 0 || refused)
+        LUMI_TRY(ingest->store(ingest, capture, c, shot, id, error));
+    else
         LUMI_TRY(lumi_capture_lose_frame(capture, id,
-                                         refused          ? refused
-                                         : source->reason ? source->reason
-                                                          : "the camera has no picture of it",
-                                         error));
-    if (isfinite(source->turns)) {
-        lumi_rig_camera_pose(&ingest->rig, c, source->turns, &pose);
-        origin = g_strdup_printf("the rig's profile at %.6f turns", source->turns);
-    } else {
-        lumi_rig_camera_pose_at(&ingest->rig, c, place->turn_angle, place->drop, &pose);
-    }
-    return lumi_capture_set_pose(capture, id, &pose, LUMI_POSE_PRIOR, origin ? origin : "the rig's profile", error);
+                                         source->reason ? source->reason : "the camera has no picture of it", error));
+    return add_pose(ingest, capture, c, source, place, id, error);
 }
 
 static int add_position(struct ingest *ingest, struct lumi_capture *capture, int position, struct lumi_error *error)

@@ -1,8 +1,9 @@
 /* An import of cameras' own recordings: which camera's is what, and the steps in order. */
 #include "pipeline/exchange/recordings.h"
 
-#include "pipeline/exchange/ingest_priv.h"
+#include "pipeline/exchange/ingest_film.h"
 
+#include <math.h>
 #include <string.h>
 
 void lumi_ingest_options_init(struct lumi_ingest_options *options)
@@ -63,7 +64,9 @@ static int take_found(struct ingest *ingest, struct lumi_error *error)
         g_autofree char *path = g_build_filename(folder, names->pdata[i], NULL);
         g_autofree char *stem = g_strdup(names->pdata[i]);
         bool is_folder = g_file_test(path, G_FILE_TEST_IS_DIR);
-        if (!is_folder && strrchr(stem, '.'))
+        if (!is_folder && (!strrchr(stem, '.') || lumi_image_format_of_name(stem) != LUMI_IMAGE_AUTO))
+            continue;
+        if (!is_folder)
             *strrchr(stem, '.') = '\0';
         int c = camera_by_name(ingest, stem);
         if (c >= 0 && !ingest->cameras[c].path)
@@ -74,6 +77,42 @@ static int take_found(struct ingest *ingest, struct lumi_error *error)
                 "%s: the rig has no camera '%s': the folder is not used (--camera NAME=FOLDER says whose it is)", path,
                 stem);
     }
+    return LUMI_OK;
+}
+
+/* A file is a video, and so is a folder that holds one and no pictures. All cameras are of one kind. */
+static int tell_kinds(struct ingest *ingest, struct lumi_error *error)
+{
+    int first = -1;
+
+    for (int c = 0; c < ingest->camera_count; c++) {
+        struct ingest_camera *camera = &ingest->cameras[c];
+        struct lumi_card card;
+        if (!camera->path)
+            continue;
+        camera->video = !g_file_test(camera->path, G_FILE_TEST_IS_DIR);
+        if (!camera->video) {
+            int code = lumi_card_list(camera->path, &card, error);
+            if (code == LUMI_OK && card.files->len == 0 && card.videos->len > 1)
+                code = lumi_fail(error, LUMI_ERR_UNSUPPORTED,
+                                 "%s: %u videos and no picture: which is meant is said by --camera %s=VIDEO",
+                                 camera->path, card.videos->len, ingest->rig.cameras[c].name);
+            if (code == LUMI_OK && card.files->len == 0 && card.videos->len == 1) {
+                char *video = g_build_filename(camera->path, g_array_index(card.videos, char *, 0), NULL);
+                g_free(camera->path);
+                camera->path = video;
+                camera->video = true;
+            }
+            lumi_card_finish(&card);
+            LUMI_TRY(code);
+        }
+        first = first < 0 ? c : first;
+        if (camera->video != ingest->cameras[first].video)
+            return lumi_fail(error, LUMI_ERR_UNSUPPORTED, "%s: %s, but %s: %s; all cameras' must be of one kind",
+                             ingest->cameras[first].path, ingest->cameras[first].video ? "a video" : "pictures",
+                             camera->path, camera->video ? "a video" : "pictures");
+    }
+    ingest->videos = ingest->cameras[first].video;
     return LUMI_OK;
 }
 
@@ -99,7 +138,21 @@ static int find_sources(struct ingest *ingest, struct lumi_error *error)
                         "%s: there is no folder of its pictures: all of its frames are missing (--camera %s=FOLDER)",
                         ingest->rig.cameras[c].name, ingest->rig.cameras[c].name);
     }
-    return LUMI_OK;
+    return tell_kinds(ingest, error);
+}
+
+void ingest_make_frames(struct ingest *ingest, int c)
+{
+    ingest->cameras[c].frames = g_new0(struct ingest_frame, ingest->shots.shots);
+    for (int s = 0; s < ingest->shots.shots; s++)
+        ingest->cameras[c].frames[s] = (struct ingest_frame){.file = -1, .turns = NAN};
+}
+
+int ingest_by_value(const void *a, const void *b)
+{
+    const double p = *(const double *)a, q = *(const double *)b;
+
+    return p < q ? -1 : p > q;
 }
 
 /* `lumi_plan_cameras` knows those that the board fires; here it is those that record by themselves, too. */
@@ -129,6 +182,7 @@ static void finish(struct ingest *ingest)
         g_free(camera->frames);
         g_free(camera->path);
         lumi_card_finish(&camera->card);
+        ingest_film_finish(camera->film);
     }
     g_array_unref(ingest->findings);
     g_free(ingest);
@@ -152,7 +206,7 @@ int lumi_ingest(const char *path, const struct lumi_ingest_options *options, str
     if (g_file_test(path, G_FILE_TEST_EXISTS))
         LUMI_GOTO(code, out, lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", path));
     LUMI_GOTO(code, out, find_sources(ingest, error));
-    LUMI_GOTO(code, out, ingest_cards(ingest, error));
+    LUMI_GOTO(code, out, ingest->videos ? ingest_films(ingest, error) : ingest_cards(ingest, error));
     LUMI_GOTO(code, out, check_strict(ingest, error));
     LUMI_GOTO(code, out, lumi_capture_create(path, &capture, error));
     LUMI_GOTO(code, out, ingest_write(ingest, capture, error));

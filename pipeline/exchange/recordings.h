@@ -23,8 +23,10 @@ struct lumi_ingest_options {
     int source_count;
     int bracket;                       /* shots a position; 0: found from the exposures */
     double offsets[LUMI_PLAN_BRACKET]; /* in stops, in the order they are taken */
-    bool trust;                        /* pictures are not decoded to see whether they are whole */
-    bool strict;                       /* whatever is found fails the import: LUMI_ERR_FORMAT with the first line */
+    double marks[2]; /* videos: when the first turn begins and the last ends, s of the first camera's; equal: by the
+                        lamp */
+    bool trust;      /* pictures are not decoded to see whether they are whole */
+    bool strict;     /* whatever is found fails the import: LUMI_ERR_FORMAT with the first line */
     int threads;
     const char *date;                                          /* YYYY-MM-DD, for the bag; may be NULL */
     void (*found)(const char *line);                           /* each thing that was found, a line; may be NULL */

@@ -14,7 +14,7 @@ said() { # PART...: the last command did
     done
 }
 
-"$lumi" sim shoot room --rig arc:3x12:0.35 --size 100x80 --format jpeg -o a -j 2 >/dev/null || fail "no capture"
+"$lumi" sim shoot object --rig arc:3x12:0.35 --size 100x80 --format jpeg -o a -j 2 >/dev/null || fail "no capture"
 pictures=$(frames a)
 
 # Four clocks, a card whose numbers go round, nothing missing: every frame is where it was, its picture too.
