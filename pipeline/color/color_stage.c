@@ -219,6 +219,7 @@ const struct lumi_stage lumi_stage_grade = {
     .wanted = wanted,
     .key = grade_key,
     .make = make_grade,
+    .bytes_per_pixel = 30,
 };
 
 const struct lumi_stage lumi_stage_color = {
@@ -232,4 +233,5 @@ const struct lumi_stage lumi_stage_color = {
     .begin = begin,
     .end = end,
     .make = make_color,
+    .bytes_per_pixel = 30,
 };

@@ -4,6 +4,7 @@
 #include "pipeline/calibrate/features.h"
 #include "pipeline/calibrate/pairs.h"
 #include "pipeline/color/color_stage.h"
+#include "pipeline/color/equalize_stage.h"
 #include "pipeline/compress/compress.h"
 #include "pipeline/depth/depth.h"
 #include "pipeline/equiangular/equiangular.h"
@@ -27,6 +28,7 @@ const struct lumi_stage *const lumi_stages[] = {
     &lumi_stage_features,
     &lumi_stage_pairs,
     &lumi_stage_subsample,
+    &lumi_stage_equalize,
     &lumi_stage_equiangular,
     &lumi_stage_match,
     &lumi_stage_depth,

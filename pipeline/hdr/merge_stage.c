@@ -309,4 +309,5 @@ const struct lumi_stage lumi_stage_merge = {
     .begin = begin,
     .end = end,
     .make = make,
+    .bytes_per_pixel = 110,
 };
