@@ -9,7 +9,7 @@
 #include <string.h>
 
 static struct cli_render_options shared;
-static char *truth_file, *frames_regex, *difference, *sheet, *codec, *poses;
+static char *truth_file, *frames_regex, *difference, *sheet, *codec, *poses, *aligned, *aligned_truth;
 static int sheet_views = 12;
 static gboolean json;
 
@@ -26,6 +26,10 @@ static const GOptionEntry options[] = {
      "instead: how far these are from the truth's, after the best similarity: a work folder, a places file, a "
      "transforms.json, a COLMAP model's folder",
      "PATH"},
+    {"aligned", 0, 0, G_OPTION_ARG_FILENAME, &aligned,
+     "the field's poses were found: its work folder or places file; the truth is brought over to them", "PATH"},
+    {"aligned-truth", 0, 0, G_OPTION_ARG_FILENAME, &aligned_truth,
+     "with --aligned: the true poses of the same pictures", "FILE"},
     {"json", 0, 0, G_OPTION_ARG_NONE, &json, "machine-readable", NULL},
     CLI_RENDER_OPTIONS(shared),
     {0},
@@ -69,6 +73,21 @@ out:
     return code;
 }
 
+static int align(struct lumi_truth_set *truth, struct lumi_error *error)
+{
+    struct lumi_pose_set found = {0}, placed = {0};
+    int code;
+
+    LUMI_GOTO(code, out, lumi_pose_set_read(aligned, &found, error));
+    LUMI_GOTO(code, out, lumi_pose_set_read(aligned_truth, &placed, error));
+    if (truth->count > 0)
+        code = lumi_pose_set_align(&placed, &found, &truth->items[0].pose, sizeof *truth->items, truth->count, error);
+out:
+    lumi_pose_set_finish(&found);
+    lumi_pose_set_finish(&placed);
+    return code;
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     struct lumi_evaluate_options o = {
@@ -76,6 +95,8 @@ static int run(int argc, char **argv, struct lumi_error *error)
     struct lumi_evaluation evaluation;
     struct lumi_truth_set truth;
 
+    if (!aligned != !aligned_truth)
+        return lumi_fail(error, LUMI_ERR_ARG, "--aligned PATH and --aligned-truth FILE go together");
     if (poses && (!truth_file || codec || argc))
         return lumi_fail(error, LUMI_ERR_ARG, "--poses PATH goes with --truth FILE alone");
     if (poses)
@@ -89,7 +110,9 @@ static int run(int argc, char **argv, struct lumi_error *error)
         return run_codec(argv[0], error);
     LUMI_TRY(cli_render_options_apply(&shared, &o.render, error));
     LUMI_TRY(lumi_truth_read(truth_file, frames_regex, false, &truth, error));
-    int code = lumi_evaluate(argv[0], &truth, &o, &evaluation, error);
+    int code = aligned ? align(&truth, error) : LUMI_OK;
+    if (code == LUMI_OK)
+        code = lumi_evaluate(argv[0], &truth, &o, &evaluation, error);
     if (code == LUMI_OK) {
         cli_progress_end();
         g_autofree char *text = json ? lumi_evaluation_json(&evaluation) : lumi_evaluation_text(&evaluation);

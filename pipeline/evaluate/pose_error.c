@@ -85,33 +85,72 @@ void lumi_pose_set_finish(struct lumi_pose_set *set)
     *set = (struct lumi_pose_set){0};
 }
 
+/* The poses of those that both sets name; `which` are indices of the second. */
+struct shared {
+    struct lumi_pose *a, *b;
+    int *which;
+    int count;
+};
+
+static void share(const struct lumi_pose_set *first, const struct lumi_pose_set *second, struct shared *shared)
+{
+    g_autoptr(GHashTable) table = g_hash_table_new(g_str_hash, g_str_equal);
+    const gsize room = (gsize)second->count + 1;
+
+    *shared = (struct shared){g_new(struct lumi_pose, room), g_new(struct lumi_pose, room), g_new(int, room), 0};
+    for (int i = 0; i < first->count; i++)
+        g_hash_table_insert(table, first->names[i], GINT_TO_POINTER(i + 1));
+    for (int i = 0; i < second->count; i++) {
+        int at = GPOINTER_TO_INT(g_hash_table_lookup(table, second->names[i])) - 1;
+        if (at < 0)
+            continue;
+        shared->a[shared->count] = first->poses[at];
+        shared->b[shared->count] = second->poses[i];
+        shared->which[shared->count++] = i;
+    }
+}
+
+static void shared_finish(struct shared *shared)
+{
+    g_free(shared->a);
+    g_free(shared->b);
+    g_free(shared->which);
+}
+
 int lumi_pose_error(const struct lumi_pose_set *found, const struct lumi_pose_set *truth,
                     struct lumi_pose_error *result, struct lumi_error *error)
 {
-    g_autoptr(GHashTable) table = g_hash_table_new(g_str_hash, g_str_equal);
-    g_autofree struct lumi_pose *from = g_new(struct lumi_pose, (gsize)truth->count + 1);
-    g_autofree struct lumi_pose *to = g_new(struct lumi_pose, (gsize)truth->count + 1);
-    g_autofree int *which = g_new(int, (gsize)truth->count + 1);
     struct lumi_similarity similarity;
-    int count = 0;
+    struct shared s;
+    int code;
 
     *result = (struct lumi_pose_error){.truths = truth->count};
-    for (int i = 0; i < found->count; i++)
-        g_hash_table_insert(table, found->names[i], GINT_TO_POINTER(i + 1));
-    for (int i = 0; i < truth->count; i++) {
-        int at = GPOINTER_TO_INT(g_hash_table_lookup(table, truth->names[i])) - 1;
-        if (at < 0)
-            continue;
-        from[count] = found->poses[at];
-        to[count] = truth->poses[i];
-        which[count++] = i;
-    }
-    LUMI_TRY(lumi_align(count, from, to, &similarity, error));
-    LUMI_TRY(lumi_pose_compare(count, from, to, &similarity, &result->distance, error));
+    share(found, truth, &s);
+    LUMI_GOTO(code, out, lumi_align(s.count, s.a, s.b, &similarity, error));
+    LUMI_GOTO(code, out, lumi_pose_compare(s.count, s.a, s.b, &similarity, &result->distance, error));
     result->scale = similarity.scale;
-    result->worst = g_strdup(truth->names[which[result->distance.worst]]);
-    result->worst_turned = g_strdup(truth->names[which[result->distance.worst_turned]]);
-    return LUMI_OK;
+    result->worst = g_strdup(truth->names[s.which[result->distance.worst]]);
+    result->worst_turned = g_strdup(truth->names[s.which[result->distance.worst_turned]]);
+out:
+    shared_finish(&s);
+    return code;
+}
+
+int lumi_pose_set_align(const struct lumi_pose_set *truth, const struct lumi_pose_set *found, struct lumi_pose *poses,
+                        size_t stride, int count, struct lumi_error *error)
+{
+    struct lumi_similarity similarity;
+    struct shared s;
+
+    share(truth, found, &s);
+    int code = lumi_align_robust(s.count, s.a, s.b, &similarity, error);
+    for (int i = 0; code == LUMI_OK && i < count; i++) {
+        struct lumi_pose *pose = (struct lumi_pose *)(void *)((char *)poses + (size_t)i * stride), moved;
+        lumi_similarity_apply(&similarity, pose, &moved);
+        *pose = moved;
+    }
+    shared_finish(&s);
+    return code;
 }
 
 void lumi_pose_error_finish(struct lumi_pose_error *result)

@@ -4,6 +4,8 @@
 
 #include "pipeline/calibrate/align.h"
 
+#include <stddef.h>
+
 /* Poses by name. */
 struct lumi_pose_set {
     int count;
@@ -14,6 +16,12 @@ struct lumi_pose_set {
  * transforms.json, a COLMAP model's folder. */
 int lumi_pose_set_read(const char *path, struct lumi_pose_set *set, struct lumi_error *error);
 void lumi_pose_set_finish(struct lumi_pose_set *set);
+
+/* Brings poses from the world of the true ones into that of those that were found, by the similarity that is best for
+ * the pictures that both sets name: what is seen from a true place is compared with what a calibrated field shows
+ * there. `poses`: `count` of them, `stride` bytes from one to the next. */
+int lumi_pose_set_align(const struct lumi_pose_set *truth, const struct lumi_pose_set *found, struct lumi_pose *poses,
+                        size_t stride, int count, struct lumi_error *error);
 
 struct lumi_pose_error {
     int truths; /* pictures that have a true pose; distance.count of them were found */
