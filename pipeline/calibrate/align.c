@@ -8,6 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* How far from its centre the ends of a camera's axes stand, in the cameras' mean distance from their middle: a
+ * camera half a millimetre beside its place counts about as much as one turned by a fiftieth of a degree, where they
+ * stand on a sphere of 70 cm. */
+#define LEVER 2.0
+
 static int by_value(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -75,38 +80,69 @@ static struct lumi_vec3 mean_of(int count, const struct lumi_pose *poses, const 
     return lumi_scale(sum, 1.0 / (taken ? taken : 1));
 }
 
-/* Umeyama's solution, its rotation by Horn's quaternion (Closed-form solution of absolute orientation using unit
- * quaternions, 1987), which is the same without a decomposition of a 3 × 3 matrix. */
+/* Horn's quaternion for the sums m of products (Closed-form solution of absolute orientation using unit quaternions,
+ * 1987), which is Umeyama's rotation without a decomposition of a 3 × 3 matrix. Returns the first eigenvalue. */
+static double turn_of(const double m[9], double q[4], double *second)
+{
+    double n[4][4] = {{m[0] + m[4] + m[8], m[5] - m[7], m[6] - m[2], m[1] - m[3]},
+                      {m[5] - m[7], m[0] - m[4] - m[8], m[1] + m[3], m[6] + m[2]},
+                      {m[6] - m[2], m[1] + m[3], m[4] - m[0] - m[8], m[5] + m[7]},
+                      {m[1] - m[3], m[6] + m[2], m[5] + m[7], m[8] - m[0] - m[4]}};
+
+    return largest(n, q, second);
+}
+
+static void add_products(struct lumi_vec3 a, struct lumi_vec3 b, double weight, double m[9])
+{
+    const double x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
+
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            m[3 * r + c] += weight * x[r] * y[c];
+}
+
+/* Of m's products how much a rotation keeps: the sum of y · (rotation x). */
+static double kept_by(const double rotation[9], const double m[9])
+{
+    double sum = 0;
+
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            sum += rotation[3 * c + r] * m[3 * r + c];
+    return sum;
+}
+
+/* Centres alone say little of a rotation, where the cameras stand close together: their axes count as points, too. */
 static int align(int count, const struct lumi_pose *from, const struct lumi_pose *to, const bool *left_out,
                  struct lumi_similarity *s, struct lumi_error *error)
 {
     struct lumi_vec3 mean_from = mean_of(count, from, left_out), mean_to = mean_of(count, to, left_out);
-    double m[9] = {0}, spread_from = 0, spread_to = 0, q[4], second;
+    double m[9] = {0}, both[9], spread_from = 0, spread_to = 0, q[4], second;
     int taken = 0;
 
     for (int i = 0; i < count; i++) {
         if (left_out && left_out[i])
             continue;
         struct lumi_vec3 a = lumi_sub(from[i].t, mean_from), b = lumi_sub(to[i].t, mean_to);
-        const double x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
-        for (int r = 0; r < 3; r++)
-            for (int c = 0; c < 3; c++)
-                m[3 * r + c] += x[r] * y[c];
+        add_products(a, b, 1, m);
         spread_from += lumi_dot(a, a);
         spread_to += lumi_dot(b, b);
         taken++;
     }
-    double n[4][4] = {{m[0] + m[4] + m[8], m[5] - m[7], m[6] - m[2], m[1] - m[3]},
-                      {m[5] - m[7], m[0] - m[4] - m[8], m[1] + m[3], m[6] + m[2]},
-                      {m[6] - m[2], m[1] + m[3], m[4] - m[0] - m[8], m[5] + m[7]},
-                      {m[1] - m[3], m[6] + m[2], m[5] + m[7], m[8] - m[0] - m[4]}};
-    double first = largest(n, q, &second), size = sqrt(spread_from * spread_to);
+    double first = turn_of(m, q, &second), size = sqrt(spread_from * spread_to);
     if (taken < 3 || !(size > 0) || !(first - second > 1e-9 * size))
         return lumi_fail(error, LUMI_ERR_FORMAT,
                          "poses: %d cameras in common, which do not determine how to lay the sets over one another",
                          taken);
+    memcpy(both, m, sizeof both);
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 3 && !(left_out && left_out[i]); k++)
+            add_products(lumi_axis(&from[i], k), lumi_axis(&to[i], k), LEVER * LEVER * size / taken, both);
+    turn_of(both, q, &second);
     lumi_rotation_from_quaternion(q, s->rotation);
-    s->scale = first / spread_from;
+    s->scale = kept_by(s->rotation, m) / spread_from;
+    if (!(s->scale > 0))
+        return lumi_fail(error, LUMI_ERR_FORMAT, "poses: the two sets have nothing to do with one another");
     s->shift = lumi_sub(mean_to, lumi_scale(lumi_rotate(s->rotation, mean_from), s->scale));
     return LUMI_OK;
 }

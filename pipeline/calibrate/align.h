@@ -11,8 +11,9 @@ struct lumi_similarity {
     struct lumi_vec3 shift;
 };
 
-/* The similarity that brings the centres of `from` nearest to those of `to`, in the least-squares sense (Umeyama:
- * Least-Squares Estimation of Transformation Parameters Between Two Point Patterns, 1991). LUMI_ERR_FORMAT where the
+/* The similarity that brings the cameras of `from` nearest to those of `to`, in the least-squares sense (Umeyama:
+ * Least-Squares Estimation of Transformation Parameters Between Two Point Patterns, 1991): their centres, and for the
+ * rotation also the ends of their axes, two mean distances long. LUMI_ERR_FORMAT where the
  * centres do not determine one: fewer than three, or all on a line. */
 int lumi_align(int count, const struct lumi_pose *from, const struct lumi_pose *to, struct lumi_similarity *similarity,
                struct lumi_error *error);

@@ -1,6 +1,7 @@
 /* The stages as a graph: equiangular → match → depth → geometry and geometry-coarse → compress. */
 #include "pipeline/graph/graph.h"
 
+#include "pipeline/calibrate/calibrate_stage.h"
 #include "pipeline/calibrate/features.h"
 #include "pipeline/calibrate/pairs.h"
 #include "pipeline/color/color_stage.h"
@@ -27,6 +28,7 @@ const struct lumi_stage *const lumi_stages[] = {
     &lumi_stage_merge,
     &lumi_stage_features,
     &lumi_stage_pairs,
+    &lumi_stage_calibrate,
     &lumi_stage_subsample,
     &lumi_stage_equalize,
     &lumi_stage_equiangular,
