@@ -1,0 +1,2 @@
+add_executable(compare_views compare_views.c)
+target_link_libraries(compare_views PRIVATE lumi_flags lumi_image lumi_base)
