@@ -82,8 +82,8 @@ bool lumi_floor_find(const struct lumi_floor *floor, double *height)
 double lumi_stand_share(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
                         const struct lumi_raster *depth)
 {
-    /* A quarter of the way down nothing else comes as near to the axis as the cameras' circle. */
-    const double low = stand->top - 0.25 * fmin(stand->top - stand->bottom, stand->centre.z - stand->top);
+    /* Nothing else comes as near to the axis as the cameras' circle: the upper half of the way is enough to tell. */
+    const double low = (stand->top + stand->bottom) / 2;
     long found = 0, all = 0;
 
     for (int y = 0; y < grid->height; y += 2)

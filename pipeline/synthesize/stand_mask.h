@@ -23,8 +23,8 @@ void lumi_floor_add(struct lumi_floor *floor, const struct lumi_grid *grid, cons
 /* The height most of it lies at. False: it is spread over all heights, or there is nothing. */
 bool lumi_floor_find(const struct lumi_floor *floor, double *height);
 
-/* Share of the view's pixels whose points are where only a stand can be: next to the axis, in the part of the room that
- * the cameras go round, or directly below it. */
+/* Share of the view's pixels whose points are where only a stand can be: next to the axis, not wider than the hole
+ * that the cameras go round, in the upper half of the way to the floor. */
 double lumi_stand_share(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
                         const struct lumi_raster *depth);
 

@@ -93,38 +93,50 @@ static float middle_depth(const struct blending *job, const struct vote *votes, 
     return votes[first].w;
 }
 
-/* Catmull and Rom's cubic, held to the four pixels around so that edges do not ring. */
-static void sample(const struct lumi_raster *image, double x, double y, float colour[3])
+static void cubic(float t, float weights[4])
+{
+    weights[0] = t * (-0.5f + t * (1 - 0.5f * t));
+    weights[1] = 1 + t * t * (-2.5f + 1.5f * t);
+    weights[2] = t * (0.5f + t * (2 - 1.5f * t));
+    weights[3] = t * t * (-0.5f + 0.5f * t);
+}
+
+static int hold(int value, int size)
+{
+    return value < 0 ? 0 : value >= size ? size - 1 : value;
+}
+
+/* Catmull and Rom's cubic over the pixels whose depth is within `tolerance` of `w`, so that colours do not run over an
+ * edge; held to those of the nearest four, so that it does not ring. False where those are of something else. */
+static bool sample(const struct lumi_synthesis_source *source, double x, double y, float w, float tolerance,
+                   float colour[3])
 {
     const int x0 = (int)floor(x - 0.5), y0 = (int)floor(y - 0.5);
-    const float fx = (float)(x - 0.5 - x0), fy = (float)(y - 0.5 - y0);
-    float weights[2][4], least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {0};
+    float across[4], down[4], sum[3] = {0}, total = 0;
+    float least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};
 
-    for (int a = 0; a < 2; a++) {
-        const float t = a ? fy : fx;
-        weights[a][0] = t * (-0.5f + t * (1 - 0.5f * t));
-        weights[a][1] = 1 + t * t * (-2.5f + 1.5f * t);
-        weights[a][2] = t * (0.5f + t * (2 - 1.5f * t));
-        weights[a][3] = t * t * (-0.5f + 0.5f * t);
-    }
-    memset(colour, 0, 3 * sizeof *colour);
-    for (int j = 0; j < 4; j++) {
-        const int sy = y0 - 1 + j < 0 ? 0 : y0 - 1 + j >= image->height ? image->height - 1 : y0 - 1 + j;
-        const float *row = lumi_row_f32(image, sy);
-        for (int i = 0; i < 4; i++) {
-            const int sx = x0 - 1 + i < 0 ? 0 : x0 - 1 + i >= image->width ? image->width - 1 : x0 - 1 + i;
-            for (int c = 0; c < 3; c++) {
-                const float value = row[3 * sx + c];
-                colour[c] += weights[0][i] * weights[1][j] * value;
-                if ((i == 1 || i == 2) && (j == 1 || j == 2)) {
-                    least[c] = fminf(least[c], value);
-                    most[c] = fmaxf(most[c], value);
-                }
+    cubic((float)(x - 0.5 - x0), across);
+    cubic((float)(y - 0.5 - y0), down);
+    for (int k = 0; k < 16; k++) {
+        const int i = k & 3, j = k >> 2;
+        const int sx = hold(x0 - 1 + i, source->image.width), sy = hold(y0 - 1 + j, source->image.height);
+        const float *pixel = lumi_row_f32(&source->image, sy) + 3 * (size_t)sx, weight = across[i] * down[j];
+        if (fabsf(lumi_row_f32(&source->depth, sy)[sx] - w) > tolerance)
+            continue;
+        total += weight;
+        for (int c = 0; c < 3; c++) {
+            sum[c] += weight * pixel[c];
+            if ((i == 1 || i == 2) && (j == 1 || j == 2)) {
+                least[c] = fminf(least[c], pixel[c]);
+                most[c] = fmaxf(most[c], pixel[c]);
             }
         }
     }
+    if (!(total > 0.1f) || !(least[0] <= most[0]))
+        return false;
     for (int c = 0; c < 3; c++)
-        colour[c] = fminf(fmaxf(colour[c], least[c]), most[c]);
+        colour[c] = fminf(fmaxf(sum[c] / total, least[c]), most[c]);
+    return true;
 }
 
 /* What a source shows of the point on the view's ray; false where it shows something else, or nothing. */
@@ -141,11 +153,8 @@ static bool look_up(const struct blending *job, const struct gathering *item, st
     const int px = (int)x, py = (int)y;
     if (source->blocked && source->blocked[(size_t)py * (size_t)source->grid->width + (size_t)px])
         return false;
-    const float expected = w / (float)q.z, there = lumi_row_f32(&source->depth, py)[px];
-    if (fabsf(there - expected) > 1.5f * same(job, expected))
-        return false;
-    sample(&source->image, x, y, colour);
-    return true;
+    const float expected = w / (float)q.z;
+    return sample(source, x, y, expected, 1.5f * same(job, expected), colour);
 }
 
 static float root(float light)

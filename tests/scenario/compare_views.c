@@ -1,5 +1,6 @@
-/* compare_views A.exr B.exr [SHEET.png]: how alike two pictures in linear light are, seen as sRGB: prints PSNR over R, G
- * and B in dB, and the share of pixels off by more than 0.15 of white; the sheet shows A, B and four times what differs. */
+/* compare_views A.exr B.exr [SHEET.png]: how alike two pictures in linear light are, seen as sRGB: prints PSNR over R,
+ * G and B in dB, and the share of pixels off by more than 0.15 of white; the sheet shows A, B and four times what
+ * differs. */
 #include "proto/image/image.h"
 
 #include <math.h>
