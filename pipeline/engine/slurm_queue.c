@@ -95,6 +95,7 @@ int lumi_slurm_parse_job(const char *text, long long *job, struct lumi_error *er
 
     *job = g_ascii_strtoll(text, &end, 10);
     if (end == text || *job < 1 || *job == G_MAXINT64 || (*end && !strchr(";\n", *end)))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "sbatch did not print a job's number: '%.60s'", text);
+        return lumi_fail(error, LUMI_ERR_FORMAT, "sbatch did not print a job's number: '%.*s'",
+                         (int)MIN(strcspn(text, "\r\n"), 60), text);
     return LUMI_OK;
 }

@@ -1,0 +1,1 @@
+lumi_fuzz(fuzz_run_record FOLDERS pipeline_engine)
