@@ -14,6 +14,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+enum { PATIENCE = 12 }; /* questions with the same answer before the work folder is looked at again */
+
 /* One process at a time hands over: it holds this until it ends. */
 static int lock_hand_over(const char *work, int *lock, struct lumi_error *error)
 {
@@ -40,18 +42,29 @@ static int look(const struct lumi_slurm_run *how, struct lumi_run **run, struct 
     return LUMI_OK;
 }
 
-/* Whether every stage with something to do has a task that waits or runs, and none has given up. */
+static bool is_done(const struct lumi_progress *progress)
+{
+    return !progress->wanted || (progress->known && progress->done == progress->count);
+}
+
+static bool has_live_task(const GArray *tasks, int stage)
+{
+    for (guint t = 0; t < tasks->len; t++) {
+        const struct lumi_task *task = &g_array_index(tasks, struct lumi_task, t);
+        if (task->state <= LUMI_TASK_RUNNING && !task->never && !strcmp(task->stage, lumi_stages[stage]->name))
+            return true;
+    }
+    return false;
+}
+
+/* Whether every stage with something to do has a task that waits or runs, and none has given up. Nor does one wait or
+ * run for what is done: a slurmctld that was killed may believe that for minutes, and keep what comes after waiting. */
 static bool is_under_way(const struct lumi_progress *progress, const GArray *tasks, const char *work)
 {
     g_autoptr(GPtrArray) failures = lumi_slurm_failures(work);
 
     for (int i = 0; lumi_stages[i]; i++) {
-        bool live = !progress[i].wanted || (progress[i].known && progress[i].done == progress[i].count);
-        for (guint t = 0; t < tasks->len && !live; t++) {
-            const struct lumi_task *task = &g_array_index(tasks, struct lumi_task, t);
-            live = task->state <= LUMI_TASK_RUNNING && !task->never && !strcmp(task->stage, lumi_stages[i]->name);
-        }
-        if (!live)
+        if (is_done(&progress[i]) == has_live_task(tasks, i))
             return false;
     }
     return failures->len == 0;
@@ -87,9 +100,10 @@ static long count_handed_over(const struct lumi_record *record)
 static void await(const struct lumi_slurm_run *how)
 {
     const long total = count_handed_over(how->record);
+    int before = -1, same = 0;
     bool answered = true;
 
-    for (;; g_usleep((gulong)how->every_s * G_USEC_PER_SEC)) {
+    for (; same < PATIENCE; g_usleep((gulong)how->every_s * G_USEC_PER_SEC)) {
         g_autoptr(GArray) tasks = NULL;
         struct lumi_error error;
         if (lumi_slurm_tasks(how->work, &tasks, &error) != LUMI_OK) {
@@ -102,6 +116,8 @@ static void await(const struct lumi_slurm_run *how)
         const int live = lumi_slurm_count_live(tasks);
         if (live == 0)
             return;
+        same = live == before ? same + 1 : 0;
+        before = live;
         if (how->progress)
             how->progress("Slurm's tasks", MAX(0, total - live), total);
     }
@@ -116,8 +132,9 @@ static int fail_with_note(const struct lumi_slurm_run *how, const GPtrArray *fai
                      how->work, how->record->retries);
 }
 
-/* One look, and what it asks for; *over where there is nothing left to do or to await. */
-static int step(const struct lumi_slurm_run *how, int round, bool *over, struct lumi_error *error)
+/* One look, and what it asks for; *over where there is nothing left to do or to await. *handed: how often this process
+ * has handed over. */
+static int step(const struct lumi_slurm_run *how, bool first, int *handed, bool *over, struct lumi_error *error)
 {
     g_autoptr(GPtrArray) failures = lumi_slurm_failures(how->work);
     g_autoptr(GArray) tasks = NULL;
@@ -130,19 +147,22 @@ static int step(const struct lumi_slurm_run *how, int round, bool *over, struct 
     const bool live = lumi_slurm_count_live(tasks) > 0;
     *over = lumi_outstanding_none(progress) && !live;
     if (*over) {
-        code = deliver(how, run, error);
-    } else if (live && round == 0 && !how->again) {
+        code = first ? lumi_record_write(how->work, how->record, error) : LUMI_OK;
+        if (code == LUMI_OK)
+            code = deliver(how, run, error);
+    } else if (live && first && !how->again) {
         code = lumi_fail(error, LUMI_ERR_BUSY,
                          "%s: %d tasks of an earlier run are in Slurm's queue ('lumi status', "
                          "'lumi retry')",
                          how->work, lumi_slurm_count_live(tasks));
     } else if (!live || !is_under_way(progress, tasks, how->work)) {
-        if (round > 0 && (failures->len || round > how->record->retries)) {
+        if (*handed > 0 && (failures->len || *handed > how->record->retries)) {
             code = fail_with_note(how, failures, error);
             goto out;
         }
         if (live)
             LUMI_GOTO(code, out, lumi_slurm_cancel(how->work, error));
+        (*handed)++;
         code = lumi_slurm_submit(run, progress, how->record, error);
     }
 out:
@@ -154,14 +174,14 @@ out:
 int lumi_slurm_run(const struct lumi_slurm_run *how, struct lumi_error *error)
 {
     bool over = false;
-    int lock = -1, code;
+    int lock = -1, handed = 0, code;
 
     LUMI_TRY(lumi_file_check_output(how->record->output, how->record->capture, error));
     LUMI_TRY(lumi_file_check_place(how->record->output, error));
     LUMI_TRY(lumi_file_check_output(how->work, how->record->capture, error));
     LUMI_TRY(lock_hand_over(how->work, &lock, error));
-    for (int round = 0;; round++) {
-        code = step(how, round, &over, error);
+    for (bool first = true;; first = false) {
+        code = step(how, first, &handed, &over, error);
         if (code != LUMI_OK || over || !how->wait)
             break;
         await(how);
