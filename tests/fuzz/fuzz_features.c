@@ -1,0 +1,31 @@
+/* The reader of ".feat" files against any bytes, with a checksum that fits; what it accepts is within its limits. */
+#include "checks.h"
+
+#include "pipeline/calibrate/features.h"
+#include "proto/base/bytes.h"
+
+static void decode(const uint8_t *data, size_t size)
+{
+    struct lumi_error error = {0};
+    struct lumi_features features;
+
+    if (checked(lumi_features_decode(data, size, "fuzz", &features, &error), &error) != LUMI_OK)
+        return;
+    for (int i = 0; i < features.count; i++)
+        if (!(features.items[i].x >= 0 && features.items[i].x <= (float)features.width && features.items[i].scale > 0))
+            abort();
+    lumi_features_finish(&features);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    struct lumi_writer writer;
+
+    with_and_without_memory(data, size, decode);
+    lumi_writer_init(&writer);
+    lumi_write_bytes(&writer, data, size);
+    lumi_write_u32(&writer, lumi_crc32c(0, data, size));
+    decode(writer.data, writer.size);
+    lumi_writer_finish(&writer);
+    return 0;
+}

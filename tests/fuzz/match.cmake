@@ -1,0 +1,2 @@
+lumi_fuzz(fuzz_features FOLDERS calibrate run base)
+lumi_fuzz(fuzz_pairs FOLDERS calibrate run base)

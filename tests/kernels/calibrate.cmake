@@ -1,0 +1,1 @@
+lumi_test(test_descriptor_kernels FOLDERS calibrate run base)
