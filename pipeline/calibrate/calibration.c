@@ -163,6 +163,65 @@ static int used_frames(const struct lumi_calibration *c)
     return used;
 }
 
+/* A lens that left what was known of it by more than this many sigmas, or with which a good part of all matches does
+ * not agree, is not known. */
+#define LENS_BEYOND 4
+#define LENS_OUTLIERS 0.35
+#define LENS_LOOSER 40
+
+/* Which lenses do not fit as they were given. */
+static int find_unfit_lenses(const struct lumi_bundle *b, bool *unfit)
+{
+    int count = 0;
+
+    for (int i = 0; i < b->lens_count; i++) {
+        int all = 0, out = 0;
+        for (int k = 0; k < b->observation_count; k++)
+            if (b->cameras[b->observations[k].camera].used && b->cameras[b->observations[k].camera].lens == i) {
+                all++;
+                out += b->observations[k].outlier;
+            }
+        unfit[i] = out > LENS_OUTLIERS * all;
+        for (int k = LUMI_LENS_FX; k <= LUMI_LENS_CY; k++)
+            unfit[i] |= fabs(b->lenses[i].block[k]) > LENS_BEYOND;
+        count += unfit[i];
+    }
+    return count;
+}
+
+/* Everything once more from its prior, with the lenses that did not fit known badly. */
+static int solve_lenses_too(const struct lumi_run *run, struct lumi_bundle *b, struct lumi_calibration *c,
+                            const bool *unfit, const struct lumi_solve_settings *settings, struct lumi_error *error)
+{
+    struct lumi_solve_settings loose = *settings;
+
+    loose.lenses_first = true;
+    for (int i = 0; i < b->lens_count; i++) {
+        memset(b->lenses[i].block, 0, sizeof b->lenses[i].block);
+        c->lenses[i].self_calibrated = unfit[i];
+        if (unfit[i])
+            set_lens_sigmas(&b->lenses[i], LENS_LOOSER);
+    }
+    for (int i = 0; i < b->camera_count; i++)
+        b->cameras[i].pose = b->cameras[i].prior = run->sources[i].prior;
+    for (int i = 0; i < b->observation_count; i++)
+        b->observations[i].outlier = false;
+    if (c->has_mechanism)
+        lumi_mechanism_reset(&c->mechanism);
+    LUMI_TRY(lumi_solve(b, c->has_mechanism ? &c->mechanism : NULL, &loose, &c->solved, error));
+    for (int i = 0; i < c->lens_count; i++) {
+        g_autofree char *what = g_strdup_printf("lens of camera %s", c->lenses[i].name);
+        double focal = c->lenses[i].before.fx + b->lenses[i].sigma[LUMI_LENS_FX] * b->lenses[i].block[LUMI_LENS_FX];
+        if (unfit[i])
+            lumi_calibration_find(c, 0, what,
+                                  "did not fit as it was given and was found from this capture itself (focal length "
+                                  "%.2f, now %.2f pixels): its distortion is only as good as the picture is covered; "
+                                  "a board tells it better (lumi calibrate lens)",
+                                  c->lenses[i].before.fx, focal);
+    }
+    return LUMI_OK;
+}
+
 static int solve(const struct lumi_run *run, struct lumi_bundle *b, struct lumi_calibration *c,
                  struct lumi_error *error)
 {
@@ -181,6 +240,9 @@ static int solve(const struct lumi_run *run, struct lumi_bundle *b, struct lumi_
                          "--calibrate no takes the poses as they are",
                          run->capture, used_frames(c), run->count);
     LUMI_TRY(lumi_solve(b, mechanism, &settings, &c->solved, error));
+    g_autofree bool *unfit = g_new0(bool, (gsize)b->lens_count);
+    if (find_unfit_lenses(b, unfit) > 0)
+        return solve_lenses_too(run, b, c, unfit, &settings, error);
     return LUMI_OK;
 }
 

@@ -40,6 +40,14 @@ void lumi_mechanism_finish(struct lumi_mechanism *m)
     *m = (struct lumi_mechanism){0};
 }
 
+void lumi_mechanism_reset(struct lumi_mechanism *m)
+{
+    memset(m->mount, 0, sizeof m->mount);
+    memset(m->platform, 0, sizeof m->platform);
+    memset(m->turn, 0, (size_t)m->shot_count * sizeof *m->turn);
+    memset(m->drop, 0, (size_t)m->knot_count * sizeof *m->drop);
+}
+
 /* A problem of the mechanism's numbers, with or without points. */
 struct problem {
     struct shim_problem *shim;

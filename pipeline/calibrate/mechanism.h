@@ -59,6 +59,8 @@ struct lumi_mechanism {
 int lumi_mechanism_init(struct lumi_mechanism *mechanism, const struct lumi_rig *rig, int frames, int shots,
                         struct lumi_error *error);
 void lumi_mechanism_finish(struct lumi_mechanism *mechanism);
+/* Back to the profile. */
+void lumi_mechanism_reset(struct lumi_mechanism *mechanism);
 
 /* Where the mechanism, as found, has frame `frame`; it must be of the rig. */
 void lumi_mechanism_pose(const struct lumi_mechanism *mechanism, int frame, struct lumi_pose *pose);

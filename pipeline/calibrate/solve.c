@@ -80,13 +80,14 @@ static int rounds(struct lumi_bundle *b, struct lumi_mechanism *m, const struct 
         for (int round = 0; round < 2; round++) {
             lumi_bundle_triangulate(b, 2);
             LUMI_TRY(lumi_mechanism_solve(m, b, round == 0 ? 20 : 10, 10, error));
-            result->mechanism_spread = sift(b, 8, 4);
+            /* With lenses that are wrong, what is far beside says nothing yet. */
+            result->mechanism_spread = sift(b, s->lenses_first ? 30 : 8, 4);
         }
         position = fmax(m->rig.uncertainty.position_m, 1e-4);
         rotation = fmax(m->rig.uncertainty.rotation, 1e-4);
     }
     set_priors(b, m, position, rotation);
-    LUMI_TRY(free_rounds(b, s, !m, result, error));
+    LUMI_TRY(free_rounds(b, s, !m || s->lenses_first, result, error));
     if (!m)
         return LUMI_OK;
     LUMI_TRY(lumi_mechanism_fit(m, b, error));

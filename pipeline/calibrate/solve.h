@@ -6,7 +6,8 @@
 #include "pipeline/calibrate/mechanism.h"
 
 struct lumi_solve_settings {
-    bool lenses;                           /* lenses with sigmas are solved for */
+    bool lenses;                           /* lenses with sigmas are solved for, at last */
+    bool lenses_first;                     /* and from the first on: they are known badly */
     bool shutter;                          /* so is the rolling shutter */
     double position_sigma, rotation_sigma; /* of the priors, where there is no mechanism */
 };

@@ -101,15 +101,7 @@ static inline void shaken_cameras(struct shaken *s, const struct shaken_settings
         lumi_pose_multiply(&s->truth[i], &moved, &s->truth[i]);
         s->bundle.cameras[i].pose = s->bundle.cameras[i].prior;
     }
-    for (int i = 0; i < rig->camera_count; i++)
-        for (int k = 0; k < LUMI_MOUNT_NUMBERS; k++)
-            m->mount[i][k] = 0;
-    for (int k = 0; k < LUMI_PLATFORM_NUMBERS; k++)
-        m->platform[k] = 0;
-    for (int i = 0; i < m->shot_count; i++)
-        m->turn[i] = 0;
-    for (int i = 0; i < m->knot_count; i++)
-        m->drop[i] = 0;
+    lumi_mechanism_reset(m);
 }
 
 /* Points and where they are seen; a picture takes what it can until it has enough. */

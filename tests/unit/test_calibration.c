@@ -254,6 +254,45 @@ static void a_missing_row_and_a_camera_without_neighbours_are_named(void **state
     finish_world(&w);
 }
 
+static void a_lens_that_does_not_fit_is_found_from_the_capture_and_said_to_be(void **state)
+{
+    struct lumi_calibration c;
+    struct world w;
+
+    (void)state;
+    make_world(&w, 0.3);
+    for (int i = 0; i < w.run.count; i++) {
+        w.run.sources[i].lens.fx *= 1.03;
+        w.run.sources[i].lens.fy *= 1.03;
+        w.run.sources[i].lens_slot = 0;
+    }
+    calibrate(&w, &c);
+    assert_int_equal(c.lens_count, 1);
+    assert_true(c.lenses[0].self_calibrated);
+    double true_focal = w.shaken.bundle.lenses[0].lens.fx;
+    assert_true(fabs(c.lenses[0].after.fx / true_focal - 1) < 0.003);
+    g_autofree char *what = g_strdup_printf("lens of camera %s", w.rig.cameras[0].name);
+    assert_true(finds(&c, what, "found from this capture"));
+    poses_are_right(&w, &c);
+    lumi_calibration_finish(&c);
+    finish_world(&w);
+}
+
+static void the_same_input_gives_the_same_bytes(void **state)
+{
+    struct lumi_calibration first, second;
+    struct world w;
+
+    (void)state;
+    make_world(&w, 0.3);
+    calibrate(&w, &first);
+    calibrate(&w, &second);
+    assert_memory_equal(first.poses, second.poses, sizeof(struct lumi_pose) * (size_t)w.run.count);
+    lumi_calibration_finish(&first);
+    lumi_calibration_finish(&second);
+    finish_world(&w);
+}
+
 static void the_report_says_how_good_it_is_and_what_to_look_at(void **state)
 {
     struct lumi_calibration c;
@@ -297,6 +336,8 @@ int main(void)
         cmocka_unit_test(two_cameras_in_each_others_place_are_named_and_the_rest_is_calibrated),
         cmocka_unit_test(a_rig_that_turned_the_other_way_is_said_to_have),
         cmocka_unit_test(a_missing_row_and_a_camera_without_neighbours_are_named),
+        cmocka_unit_test(a_lens_that_does_not_fit_is_found_from_the_capture_and_said_to_be),
+        cmocka_unit_test(the_same_input_gives_the_same_bytes),
         cmocka_unit_test(the_report_says_how_good_it_is_and_what_to_look_at),
         cmocka_unit_test(nothing_in_common_at_all_is_an_error_that_says_what_to_do),
     };
