@@ -163,8 +163,8 @@ static int used_frames(const struct lumi_calibration *c)
     return used;
 }
 
-/* A lens that left what was known of it by more than this many sigmas, or with which a good part of all matches does
- * not agree, is not known. */
+/* A lens that left what was known of it by more than this many sigmas is not known; none is where a good part of all
+ * that was seen does not agree. */
 #define LENS_BEYOND 4
 #define LENS_OUTLIERS 0.35
 #define LENS_LOOSER 40
@@ -172,15 +172,14 @@ static int used_frames(const struct lumi_calibration *c)
 /* Which lenses do not fit as they were given. */
 static int find_unfit_lenses(const struct lumi_bundle *b, bool *unfit)
 {
-    int count = 0;
+    int count = 0, all = 0, out = 0;
 
+    for (int k = 0; k < b->observation_count; k++)
+        if (b->cameras[b->observations[k].camera].used) {
+            all++;
+            out += b->observations[k].outlier;
+        }
     for (int i = 0; i < b->lens_count; i++) {
-        int all = 0, out = 0;
-        for (int k = 0; k < b->observation_count; k++)
-            if (b->cameras[b->observations[k].camera].used && b->cameras[b->observations[k].camera].lens == i) {
-                all++;
-                out += b->observations[k].outlier;
-            }
         unfit[i] = out > LENS_OUTLIERS * all;
         for (int k = LUMI_LENS_FX; k <= LUMI_LENS_CY; k++)
             unfit[i] |= fabs(b->lenses[i].block[k]) > LENS_BEYOND;

@@ -9,6 +9,7 @@
 #define DEGREE (LUMI_PI / 180)
 #define LIKELY 0.7     /* share of motions that agree with a hypothesis which is taken */
 #define UNLIKELY 0.5   /* and at most with the capture as it is */
+#define OUTSIDE 0.5    /* share of a pair's matches beyond the prior's band that contradicts the prior */
 #define FEWEST 6       /* motions that anything is concluded from */
 #define FREE_FEWEST 12 /* matches that a motion is believed from */
 
@@ -38,7 +39,8 @@ static bool known(const struct lumi_motion *m)
            m->rotation[0] * m->rotation[0] + m->rotation[4] * m->rotation[4] + m->rotation[8] * m->rotation[8] > 0;
 }
 
-/* Whether the pictures moved as the hypothesis has it. */
+/* Whether the pictures moved as the hypothesis has it. Of the capture as it is the matches themselves say so: a motion
+ * found from them alone has two answers where all that is seen lies in one plane, and the wrong one may be taken. */
 static bool agrees(const struct lumi_run *run, const struct hypothesis *h, const struct lumi_motion *m)
 {
     const struct lumi_rig_uncertainty *u = run->rig ? &run->rig->uncertainty : NULL;
@@ -46,6 +48,8 @@ static bool agrees(const struct lumi_run *run, const struct hypothesis *h, const
     struct lumi_pose a, b;
     double between[9];
 
+    if (h->first < 0 && !h->backwards)
+        return m->free_outside < OUTSIDE * m->free_count;
     pose_under(run, h, m->a, &a);
     pose_under(run, h, m->b, &b);
     lumi_rotation_between(a.r, b.r, between);
