@@ -13,7 +13,7 @@ static char *output, *images, *every, *flip;
 static int limit, threads;
 static double unit, focal, fov, plane;
 static gboolean trust, strict;
-static char *rig_name, *plan_path, *brackets, *marks, **cameras;
+static char *rig_name, *plan_path, *brackets, *marks, *white_balance, **cameras;
 
 static const GOptionEntry options[] = {
     {"output", 'o', 0, G_OPTION_ARG_FILENAME, &output, "the capture to make (needed)", "CAPTURE"},
@@ -36,6 +36,9 @@ static const GOptionEntry options[] = {
      "FILE"},
     {"brackets", 0, 0, G_OPTION_ARG_STRING, &brackets,
      "stops of the shots at every position, in their order (found from the exposures)", "-2,0,2"},
+    {"white-balance", 0, 0, G_OPTION_ARG_STRING, &white_balance,
+     "of all raw files: camera (the median of what they say), daylight, auto (grey on the whole) or factors",
+     "WHAT|R,G,B"},
     {"marks", 0, 0, G_OPTION_ARG_STRING, &marks,
      "videos: when the first turn begins and the last ends, in seconds of the first camera's (by the rig's lamp)",
      "BEGIN,END"},
@@ -80,6 +83,26 @@ static int read_brackets(struct lumi_ingest_options *ingest, struct lumi_error *
     for (int i = 0; i < ingest->bracket; i++)
         if (!(ingest->offsets[i] >= -20 && ingest->offsets[i] <= 20))
             return lumi_fail(error, LUMI_ERR_ARG, "--brackets %s: -20 to 20 stops wanted", brackets);
+    return LUMI_OK;
+}
+
+static int read_white(struct lumi_ingest_options *ingest, struct lumi_error *error)
+{
+    static const char *const names[] = {"camera", "daylight", "auto", NULL};
+    int choice = LUMI_INGEST_WHITE_GIVEN;
+
+    if (!white_balance)
+        return LUMI_OK;
+    if (strchr(white_balance, ',')) {
+        LUMI_TRY(cli_parse_doubles("--white-balance", white_balance, ',', 3, ingest->white_given, error));
+        for (int c = 0; c < 3; c++)
+            if (!(ingest->white_given[c] >= 0.01 && ingest->white_given[c] <= 100))
+                return lumi_fail(error, LUMI_ERR_ARG, "--white-balance %s: factors of 0.01 to 100 wanted",
+                                 white_balance);
+    } else {
+        LUMI_TRY(cli_parse_choice("--white-balance", white_balance, names, &choice, error));
+    }
+    ingest->white = (enum lumi_ingest_white)choice;
     return LUMI_OK;
 }
 
@@ -131,6 +154,7 @@ static int run_ingest(const char *folder, const char *date, struct lumi_error *e
     }
     LUMI_TRY(read_brackets(&ingest, error));
     LUMI_TRY(read_marks(&ingest, error));
+    LUMI_TRY(read_white(&ingest, error));
     LUMI_TRY(read_cameras(sources, &ingest, error));
     if (!folder && ingest.source_count == 0)
         return lumi_fail(error, LUMI_ERR_ARG, "from where? SOURCE or --camera NAME=FOLDER is needed");
@@ -184,9 +208,10 @@ static int run_import(int argc, char **argv, struct lumi_error *error)
                          "--focal, --fov and --plane");
     if (rig_name)
         return run_ingest(argc > 0 ? argv[0] : NULL, date, error);
-    if (cameras || plan_path || brackets || marks || strict)
-        return lumi_fail(error, LUMI_ERR_ARG,
-                         "--camera, --plan, --brackets, --marks and --strict want a rig: --rig PROFILE");
+    if (cameras || plan_path || brackets || marks || white_balance || strict)
+        return lumi_fail(
+            error, LUMI_ERR_ARG,
+            "--camera, --plan, --brackets, --white-balance, --marks and --strict want a rig: --rig PROFILE");
     if (argc < 1)
         return lumi_fail(error, LUMI_ERR_ARG, "from where? SOURCE is needed");
     return run_list(argv[0], date, error);

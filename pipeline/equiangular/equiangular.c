@@ -115,7 +115,7 @@ static int read_linear(const struct lumi_run *run, int index, struct lumi_raster
     struct lumi_raster raster;
 
     *linear = (struct lumi_raster){0};
-    LUMI_TRY(lumi_image_read(path, 3, &raster, NULL, error));
+    LUMI_TRY(lumi_source_read(source, path, &raster, error));
     int result = LUMI_OK;
     if (raster.width != source->lens.width || raster.height != source->lens.height) {
         result = lumi_fail(error, LUMI_ERR_FORMAT, "%s: the image is %d × %d, its camera %d × %d", path, raster.width,

@@ -36,6 +36,7 @@ struct ingest {
     struct ingest_camera cameras[LUMI_RIG_CAMERAS];
     struct lumi_shot_plan shots;
     int64_t begin_us; /* what times of items are counted from; LUMI_NO_TIME */
+    double white[3];  /* of raw files; green 0: there are none */
     GArray *findings; /* struct ingest_finding */
     bool videos;
     const char *what; /* "cards", "videos" */
@@ -70,6 +71,9 @@ int ingest_cards(struct ingest *ingest, struct lumi_error *error);
 void ingest_make_frames(struct ingest *ingest, int camera);
 /* For sorting doubles. */
 int ingest_by_value(const void *a, const void *b);
+
+/* One white balance for all raw files among the chosen ones. */
+int ingest_find_white(struct ingest *ingest, struct lumi_error *error);
 
 /* All rows and files of the capture. */
 int ingest_write(struct ingest *ingest, struct lumi_capture *capture, struct lumi_error *error);

@@ -268,6 +268,18 @@ static int add_position(struct ingest *ingest, struct lumi_capture *capture, int
     return LUMI_OK;
 }
 
+static int add_white(const struct ingest *ingest, struct lumi_capture *capture, struct lumi_error *error)
+{
+    char numbers[3][G_ASCII_DTOSTR_BUF_SIZE];
+
+    if (!(ingest->white[1] > 0))
+        return LUMI_OK;
+    for (int c = 0; c < 3; c++)
+        g_ascii_dtostr(numbers[c], sizeof numbers[c], ingest->white[c]);
+    g_autofree char *white = g_strdup_printf("%s,%s,%s", numbers[0], numbers[1], numbers[2]);
+    return lumi_capture_set_meta(capture, "white balance", white, error);
+}
+
 static int add_texts(struct ingest *ingest, struct lumi_capture *capture, struct lumi_error *error)
 {
     char *text = lumi_alloc(LUMI_RIG_TEXT_MAX + 1, 1);
@@ -289,6 +301,7 @@ int ingest_write(struct ingest *ingest, struct lumi_capture *capture, struct lum
 {
     LUMI_TRY(lumi_capture_begin(capture, error));
     LUMI_TRY(add_texts(ingest, capture, error));
+    LUMI_TRY(add_white(ingest, capture, error));
     LUMI_TRY(add_cameras(ingest, capture, error));
     LUMI_TRY(add_devices(ingest, capture, error));
     LUMI_TRY(add_clocks(ingest, capture, error));

@@ -207,6 +207,8 @@ int lumi_ingest(const char *path, const struct lumi_ingest_options *options, str
         LUMI_GOTO(code, out, lumi_fail(error, LUMI_ERR_EXISTS, "%s: is there already", path));
     LUMI_GOTO(code, out, find_sources(ingest, error));
     LUMI_GOTO(code, out, ingest->videos ? ingest_films(ingest, error) : ingest_cards(ingest, error));
+    if (!ingest->videos)
+        LUMI_GOTO(code, out, ingest_find_white(ingest, error));
     LUMI_GOTO(code, out, check_strict(ingest, error));
     LUMI_GOTO(code, out, lumi_capture_create(path, &capture, error));
     LUMI_GOTO(code, out, ingest_write(ingest, capture, error));

@@ -15,6 +15,15 @@ struct lumi_ingest_source {
     const char *path;   /* its folder or video */
 };
 
+/* The one white balance with which all raw files of the capture are developed: the median of what the files say, that
+ * of daylight, that by which pictures all around are grey on the whole, or given. */
+enum lumi_ingest_white {
+    LUMI_INGEST_WHITE_CAMERA = 0,
+    LUMI_INGEST_WHITE_DAYLIGHT,
+    LUMI_INGEST_WHITE_AUTO,
+    LUMI_INGEST_WHITE_GIVEN
+};
+
 struct lumi_ingest_options {
     const struct lumi_rig *rig;
     const struct lumi_plan *plan; /* NULL: what the rig is meant for */
@@ -23,6 +32,8 @@ struct lumi_ingest_options {
     int source_count;
     int bracket;                       /* shots a position; 0: found from the exposures */
     double offsets[LUMI_PLAN_BRACKET]; /* in stops, in the order they are taken */
+    enum lumi_ingest_white white;
+    double white_given[3]; /* factors of red, green, blue */
     double marks[2]; /* videos: when the first turn begins and the last ends, s of the first camera's; equal: by the
                         lamp */
     bool trust;      /* pictures are not decoded to see whether they are whole */

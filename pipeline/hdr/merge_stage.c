@@ -51,6 +51,7 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
     lumi_key_double(k, brackets.nominal);
     lumi_key_bytes(k, brackets.offsets, sizeof *brackets.offsets * (size_t)brackets.offset_count);
     lumi_key_int(k, source->part_count);
+    lumi_key_white(k, source);
     for (int i = 0; i < source->part_count; i++) {
         const struct lumi_source_part *part = &source->parts[i];
         lumi_key_bytes(k, part->sha256, strlen(part->sha256));
@@ -135,7 +136,7 @@ static int read_part(const struct lumi_source *source, int part, const struct lu
     const char *path = source->parts[part].path;
     struct lumi_raster picture;
 
-    LUMI_TRY(lumi_image_read(path, 3, &picture, NULL, error));
+    LUMI_TRY(lumi_source_read(source, path, &picture, error));
     int code = LUMI_OK;
     if (picture.width != source->lens.width || picture.height != source->lens.height)
         code = lumi_fail(error, LUMI_ERR_FORMAT, "%s: the image is %d × %d, its camera %d × %d", path, picture.width,

@@ -13,6 +13,7 @@
 #define LUMI_PIPELINE_RUN_RUN_H
 
 #include "proto/base/lens.h"
+#include "proto/base/raster.h"
 #include "proto/base/result.h"
 #include "proto/capture/capture.h"
 #include "proto/lightfield/disk.h"
@@ -96,6 +97,7 @@ struct lumi_source {
     double exposure_s, iso, exposure_offset; /* as in struct lumi_source_part */
     enum lumi_pose_source pose_source;
     struct lumi_pose prior; /* the capture's pose, whatever calibration says */
+    double white[3];        /* white balance of its raw files, the capture's; green 0: their own */
     int part_count;         /* of a bracket, darkest first as asked for, 1 where the rest of it is not there; 0: the
                                capture has no brackets */
     struct lumi_source_part *parts; /* owned */
@@ -172,6 +174,11 @@ void lumi_key_pose(struct lumi_key *key, const struct lumi_pose *pose);
 /* The picture of a frame: the file, or what the stage `merge` made of a bracket; free with g_free. And what stands for
  * it in a key. */
 char *lumi_run_image(const struct lumi_run *run, int index);
+/* Reads one of a source's files as RGB, raw ones with the capture's white balance; in keys beside the file's checksum.
+ */
+int lumi_source_read(const struct lumi_source *source, const char *path, struct lumi_raster *raster,
+                     struct lumi_error *error);
+void lumi_key_white(struct lumi_key *key, const struct lumi_source *source);
 void lumi_key_image(struct lumi_key *key, const struct lumi_run *run, int index);
 
 /* A view, as it stands after some stages: picture (linear light), inverse depth (channel "W"), picture after the

@@ -206,6 +206,24 @@ static int load_frames(struct lumi_run *run, struct loading *loading, struct lum
     return code;
 }
 
+/* "R,G,B" under the key that imports write. */
+static int load_white(struct lumi_run *run, struct lumi_capture *capture, struct lumi_error *error)
+{
+    double white[3] = {0};
+    char text[128], *at = text;
+
+    LUMI_TRY(lumi_capture_get_meta(capture, "white balance", text, sizeof text, error));
+    for (int c = 0; text[0] && c < 3; c++) {
+        white[c] = g_ascii_strtod(at, &at);
+        if (!(white[c] > 0 && white[c] < 1000) || (c < 2 && *at++ != ','))
+            return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its white balance is '%s', not three factors", run->capture,
+                             text);
+    }
+    for (int i = 0; i < run->count; i++)
+        memcpy(run->sources[i].white, white, sizeof white);
+    return LUMI_OK;
+}
+
 int lumi_sources_load(struct lumi_run *run, struct lumi_error *error)
 {
     g_autoptr(GArray) cameras = g_array_new(FALSE, FALSE, sizeof(int64_t));
@@ -216,7 +234,8 @@ int lumi_sources_load(struct lumi_run *run, struct lumi_error *error)
     LUMI_GOTO(code, out, lumi_capture_open(run->capture, LUMI_CAPTURE_READ, &loading.capture, error));
     load_cameras(&loading);
     LUMI_GOTO(code, out, load_rig(run, loading.capture, error));
-    code = load_frames(run, &loading, error);
+    LUMI_GOTO(code, out, load_frames(run, &loading, error));
+    code = load_white(run, loading.capture, error);
 out:
     lumi_capture_close(loading.capture);
     return code;

@@ -3,6 +3,7 @@
 #include "pipeline/run/places.h"
 #include "pipeline/run/run_priv.h"
 #include "pipeline/run/sources.h"
+#include "proto/image/image.h"
 
 #include <glib.h>
 #include <string.h>
@@ -35,6 +36,21 @@ char *lumi_run_image(const struct lumi_run *run, int index)
     return source->part_count ? lumi_run_path(run, "merge", index, ".exr") : g_strdup(source->path);
 }
 
+int lumi_source_read(const struct lumi_source *source, const char *path, struct lumi_raster *raster,
+                     struct lumi_error *error)
+{
+    struct lumi_image_development development = {{0}, false};
+
+    memcpy(development.white, source->white, sizeof development.white);
+    return lumi_image_read_developed(path, 3, &development, raster, NULL, error);
+}
+
+void lumi_key_white(struct lumi_key *key, const struct lumi_source *source)
+{
+    for (int c = 0; source->white[1] > 0 && c < 3; c++)
+        lumi_key_double(key, source->white[c]);
+}
+
 void lumi_key_image(struct lumi_key *key, const struct lumi_run *run, int index)
 {
     const struct lumi_source *source = &run->sources[index];
@@ -43,6 +59,8 @@ void lumi_key_image(struct lumi_key *key, const struct lumi_run *run, int index)
         lumi_key_input(key, run, "merge", index);
     else
         lumi_key_bytes(key, source->sha256, strlen(source->sha256));
+    if (!source->part_count)
+        lumi_key_white(key, source);
 }
 
 static const char *stage_of(const struct lumi_run *run, int index, enum lumi_view_part part)

@@ -102,20 +102,20 @@ static int to_rgb(const struct image_source *source, struct lumi_raster *raster)
     return LUMI_OK;
 }
 
-int lumi_image_read_memory(const void *data, size_t size, const char *name, int channels, struct lumi_raster *raster,
-                           struct lumi_image_meta *meta, struct lumi_error *error)
+static int read_all(const struct image_source *source, int channels, struct lumi_raster *raster,
+                    struct lumi_image_meta *meta)
 {
-    struct image_source source = {data, size, size, name, error, 0};
     struct lumi_image_meta own = {0};
 
     *raster = (struct lumi_raster){0};
     if (meta)
         *meta = own;
     if (channels != 0 && channels != 3)
-        return lumi_fail(error, LUMI_ERR_ARG, "%s: images are read with their own channels or as RGB", name);
-    int code = read_source(&source, raster, &own);
+        return lumi_fail(source->error, LUMI_ERR_ARG, "%s: images are read with their own channels or as RGB",
+                         source->name);
+    int code = read_source(source, raster, &own);
     if (code == LUMI_OK && channels == 3 && raster->channels != 3)
-        code = to_rgb(&source, raster);
+        code = to_rgb(source, raster);
     if (code != LUMI_OK)
         lumi_raster_finish(raster);
     if (code == LUMI_OK && meta)
@@ -125,10 +125,18 @@ int lumi_image_read_memory(const void *data, size_t size, const char *name, int 
     return code;
 }
 
+int lumi_image_read_memory(const void *data, size_t size, const char *name, int channels, struct lumi_raster *raster,
+                           struct lumi_image_meta *meta, struct lumi_error *error)
+{
+    struct image_source source = {data, size, size, name, error, 0, NULL};
+
+    return read_all(&source, channels, raster, meta);
+}
+
 int lumi_image_read_reduced(const void *data, size_t size, const char *name, int most, struct lumi_raster *raster,
                             struct lumi_image_info *info, struct lumi_error *error)
 {
-    struct image_source source = {data, size, size, name, error, most};
+    struct image_source source = {data, size, size, name, error, most, NULL};
     struct lumi_image_meta meta = {0};
 
     *raster = (struct lumi_raster){0};
@@ -141,8 +149,8 @@ int lumi_image_read_reduced(const void *data, size_t size, const char *name, int
     return code;
 }
 
-int lumi_image_read(const char *path, int channels, struct lumi_raster *raster, struct lumi_image_meta *meta,
-                    struct lumi_error *error)
+int lumi_image_read_developed(const char *path, int channels, const struct lumi_image_development *development,
+                              struct lumi_raster *raster, struct lumi_image_meta *meta, struct lumi_error *error)
 {
     uint8_t *data;
     size_t size;
@@ -151,9 +159,16 @@ int lumi_image_read(const char *path, int channels, struct lumi_raster *raster, 
     if (meta)
         *meta = (struct lumi_image_meta){0};
     LUMI_TRY(lumi_file_read(path, MAX_FILE, &data, &size, error));
-    int code = lumi_image_read_memory(data, size, path, channels, raster, meta, error);
+    struct image_source source = {data, size, size, path, error, 0, development};
+    int code = read_all(&source, channels, raster, meta);
     lumi_free(data);
     return code;
+}
+
+int lumi_image_read(const char *path, int channels, struct lumi_raster *raster, struct lumi_image_meta *meta,
+                    struct lumi_error *error)
+{
+    return lumi_image_read_developed(path, channels, NULL, raster, meta, error);
 }
 
 int lumi_image_read_channel(const char *path, const char *channel, struct lumi_raster *raster, struct lumi_error *error)
@@ -163,7 +178,7 @@ int lumi_image_read_channel(const char *path, const char *channel, struct lumi_r
 
     *raster = (struct lumi_raster){0};
     LUMI_TRY(lumi_file_read(path, MAX_FILE, &data, &size, error));
-    struct image_source source = {data, size, size, path, error, 0};
+    struct image_source source = {data, size, size, path, error, 0, NULL};
     int code = image_exr.probe(data, size) ? image_exr_channel(&source, channel, raster)
                                            : lumi_fail(error, LUMI_ERR_FORMAT, "%s: not an OpenEXR image", path);
     if (code != LUMI_OK)
@@ -175,7 +190,7 @@ int lumi_image_read_channel(const char *path, const char *channel, struct lumi_r
 int lumi_image_info_memory(const void *data, size_t size, const char *name, struct lumi_image_info *info,
                            struct lumi_error *error)
 {
-    struct image_source source = {data, size, size, name, error, 0};
+    struct image_source source = {data, size, size, name, error, 0, NULL};
     struct lumi_image_meta meta = {0};
     int code = read_source(&source, NULL, &meta);
 
@@ -196,7 +211,7 @@ static bool meta_from_beginning(const char *path, struct lumi_image_meta *meta)
     uint8_t *data = lumi_alloc(HEADER_BYTES, 1);
     if (data && !fstat(fd, &status) && S_ISREG(status.st_mode)) {
         ssize_t got = read(fd, data, HEADER_BYTES);
-        struct image_source source = {data, got > 0 ? (size_t)got : 0, (uint64_t)status.st_size, path, NULL, 0};
+        struct image_source source = {data, got > 0 ? (size_t)got : 0, (uint64_t)status.st_size, path, NULL, 0, NULL};
         done = got > 0 && !image_tiff.probe(data, source.size) && !image_raw.probe(data, source.size) &&
                read_source(&source, NULL, meta) == LUMI_OK;
         if (!done)
@@ -216,7 +231,7 @@ int lumi_image_read_meta(const char *path, struct lumi_image_meta *meta, struct 
     if (meta_from_beginning(path, meta))
         return LUMI_OK;
     LUMI_TRY(lumi_file_read(path, MAX_FILE, &data, &size, error));
-    struct image_source source = {data, size, size, path, error, 0};
+    struct image_source source = {data, size, size, path, error, 0, NULL};
     int code = read_source(&source, NULL, meta);
     if (code != LUMI_OK)
         lumi_image_meta_finish(meta);

@@ -57,6 +57,9 @@ struct lumi_image_meta {
     int64_t taken_us; /* Unix time of the exposure; where the file names no time zone, as if the camera's clock showed
                          universal time; 0: it does not say */
     char serial[64], model[64]; /* of the camera's body; "" */
+    /* Raw files: what red, green and blue were multiplied with, and what daylight wants of that sensor; green is 1, all
+     * 0 where the file does not tell. */
+    double white[3], daylight[3];
 };
 
 void lumi_image_meta_finish(struct lumi_image_meta *meta);
@@ -66,6 +69,14 @@ void lumi_image_meta_finish(struct lumi_image_meta *meta);
  * are all zero. CMYK and palettes beyond RGB, tiled or deep OpenEXR parts and the like: LUMI_ERR_UNSUPPORTED. */
 int lumi_image_read(const char *path, int channels, struct lumi_raster *raster, struct lumi_image_meta *meta,
                     struct lumi_error *error);
+/* How a raw file is developed; other formats do not ask. All zero: as it says itself. */
+struct lumi_image_development {
+    double white[3]; /* red, green and blue are multiplied with; green 0: the file's own balance */
+    bool automatic;  /* instead: so that the picture is grey on the whole; meta->white tells with what */
+};
+/* As lumi_image_read. */
+int lumi_image_read_developed(const char *path, int channels, const struct lumi_image_development *development,
+                              struct lumi_raster *raster, struct lumi_image_meta *meta, struct lumi_error *error);
 /* The same from memory; `name` stands for the path in errors. */
 int lumi_image_read_memory(const void *data, size_t size, const char *name, int channels, struct lumi_raster *raster,
                            struct lumi_image_meta *meta, struct lumi_error *error);

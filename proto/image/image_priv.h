@@ -12,7 +12,8 @@ struct image_source {
     uint64_t file_size; /* bytes there are in all */
     const char *name;
     struct lumi_error *error;
-    int most; /* pixels in a row that are wanted; 0: all there are */
+    int most;                                         /* pixels in a row that are wanted; 0: all there are */
+    const struct lumi_image_development *development; /* of raw files; NULL: as they say */
 };
 
 struct image_codec {

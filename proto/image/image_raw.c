@@ -120,6 +120,16 @@ static int64_t camera_time(time_t timestamp)
     return (int64_t)timegm(&fields) * 1000000;
 }
 
+/* About green. */
+static void take_white(const float multipliers[4], double white[3])
+{
+    for (int c = 0; c < 3; c++)
+        if (!(multipliers[c] > 0 && multipliers[c] < 1e6f))
+            return;
+    for (int c = 0; c < 3; c++)
+        white[c] = (double)multipliers[c] / (double)multipliers[1];
+}
+
 static int describe(const struct image_source *source, const libraw_data_t *raw, struct lumi_image_meta *meta)
 {
     int channels = raw->idata.colors == 1 ? 1 : 3;
@@ -149,11 +159,23 @@ static int describe(const struct image_source *source, const libraw_data_t *raw,
         memcpy(meta->serial, raw->shootinginfo.BodySerial, sizeof meta->serial - 1);
     if (!meta->model[0])
         memcpy(meta->model, raw->idata.model, sizeof meta->model - 1);
+    take_white(raw->color.cam_mul, meta->white);
+    take_white(raw->color.pre_mul, meta->daylight);
     meta->info.format = LUMI_IMAGE_RAW;
     return LUMI_OK;
 }
 
-static void set_up(libraw_data_t *raw)
+static void set_white(libraw_output_params_t *out, const struct lumi_image_development *development)
+{
+    if (!development || (!development->automatic && !(development->white[1] > 0)))
+        return;
+    out->use_camera_wb = 0;
+    out->use_auto_wb = development->automatic ? 1 : 0;
+    for (int c = 0; !development->automatic && c < 4; c++) /* two greens */
+        out->user_mul[c] = (float)(development->white[c == 3 ? 1 : c] / development->white[1]);
+}
+
+static void set_up(libraw_data_t *raw, const struct lumi_image_development *development)
 {
     libraw_output_params_t *out = &raw->params;
 
@@ -167,6 +189,7 @@ static void set_up(libraw_data_t *raw)
     out->user_qual = DEMOSAIC_AHD;
     out->user_flip = 0;
     out->use_fuji_rotate = 0;
+    set_white(out, development);
 }
 
 static int take_pixels(const struct image_source *source, const libraw_processed_image_t *image,
@@ -191,17 +214,19 @@ static int take_pixels(const struct image_source *source, const libraw_processed
 }
 
 static int develop(const struct image_source *source, libraw_data_t *raw, const bool *damaged,
-                   struct lumi_raster *raster)
+                   struct lumi_raster *raster, struct lumi_image_meta *meta)
 {
     libraw_processed_image_t *image = NULL;
     int code;
 
-    set_up(raw);
+    set_up(raw, source->development);
     code = libraw_unpack(raw);
     if (code == LIBRAW_SUCCESS && *damaged)
         code = LIBRAW_DATA_ERROR;
     if (code == LIBRAW_SUCCESS)
         code = libraw_dcraw_process(raw);
+    if (code == LIBRAW_SUCCESS && source->development && source->development->automatic)
+        take_white(raw->color.pre_mul, meta->white);
     if (code == LIBRAW_SUCCESS)
         image = libraw_dcraw_make_mem_image(raw, &code);
     int result = code == LIBRAW_SUCCESS && image ? take_pixels(source, image, raster) : fail_raw(source, code);
@@ -236,7 +261,7 @@ static int read_raw(const struct image_source *source, struct lumi_raster *raste
     if (code == LUMI_OK && raster)
         code = image_claim(source, &meta->info, raster);
     if (code == LUMI_OK && raster)
-        code = develop(source, raw, &damaged, raster);
+        code = develop(source, raw, &damaged, raster, meta);
     libraw_close(raw);
     return code;
 }

@@ -9,7 +9,7 @@
 static void read_channel(const uint8_t *data, size_t size)
 {
     struct lumi_error error = {0};
-    struct image_source source = {data, size, size, "fuzz", &error, 0};
+    struct image_source source = {data, size, size, "fuzz", &error, 0, NULL};
     struct lumi_raster raster = {0};
 
     if (checked(image_exr_channel(&source, size % 2 ? "Y" : "B", &raster), &error) == LUMI_OK && raster.channels != 1)

@@ -1,7 +1,7 @@
 #!/bin/sh
-# cards_test.sh LUMI MAKE_CARDS: what lay on the memory cards of a rig becomes a capture with the mechanism's poses;
+# cards_test.sh LUMI MAKE_CARDS MAKE_DNG: what lay on the memory cards of a rig becomes a capture with the mechanism's poses;
 # what is missing, doubled, damaged or of no shot is said in a line each, and the rest becomes a light field.
-lumi=$1 make_cards=$2
+lumi=$1 make_cards=$2 make_dng=$3
 # shellcheck source=tests/scenario/expect.sh
 . "$(dirname "$0")/expect.sh"
 cd "$scratch" || exit 1
@@ -75,6 +75,25 @@ said "c03: no picture of turn 0, position 0, exposure 1 of 3"
 [ ! -e g/data/frames/c01-t00-p004-b1.JPG ] || fail "another exposure took the place of the one that is missing"
 expect 0 "" "$lumi" import brackets --rig brackets.rig --brackets -2,0,2 -o h -j 2
 [ "$(ls g/data/frames | cksum)" = "$(ls h/data/frames | cksum)" ] || fail "--brackets gives other frames"
+
+# Raw files are developed with the capture's white balance: what the files say, what is said, what makes them grey.
+"$lumi" sim shoot object --rig arc:3x12:0.35 --size 100x80 --format exr -o light -j 2 >/dev/null || fail "no capture"
+mkdir -p raw/c01
+for picture in light/data/frames/r01*.exr; do
+    "$make_dng" "$picture" "raw/c01/$(basename "$picture" .exr).dng" 12 || fail "$picture"
+done
+for white in camera 1.66667,1,1.42857 1,1,1 auto daylight; do
+    expect 0 "c01: its pictures do not tell when they were taken: matched by their order alone" \
+        "$lumi" import raw --rig cards.rig --white-balance $white -o "raw-$white" -j 2
+    "$lumi" stage equiangular "raw-$white" -j 2 >/dev/null || fail "developing with $white"
+    cat "raw-$white".work/equiangular/*.exr | cksum >"$white.sum"
+done
+for white in 1,1,1 auto; do
+    cmp -s camera.sum "$white.sum" && fail "--white-balance $white changes nothing"
+done
+cmp -s 1,1,1.sum auto.sum && fail "--white-balance auto is none"
+expect_line 2 "factors of 0.01 to 100" "$lumi" import raw --rig cards.rig --white-balance 0,1,1 -o x
+expect_line 2 "--white-balance" "$lumi" import raw --rig cards.rig --white-balance warm -o x
 
 # Command lines and inputs that cannot be.
 expect_line 3 "none: reading the folder" "$lumi" import none --rig cards.rig -o x

@@ -191,6 +191,68 @@ static void black_level_and_white_balance_are_the_frames_own_where_nobody_says_o
     assert_true(told > 36 && fabs(own - told) < 1e-6);
 }
 
+static void mean_of(const char *path, const struct lumi_image_development *development, double mean[3],
+                    struct lumi_image_meta *meta)
+{
+    struct lumi_error error = {0};
+    struct lumi_raster raster;
+
+    memset(mean, 0, 3 * sizeof *mean);
+    if (lumi_image_read_developed(path, 3, development, &raster, meta, &error) != LUMI_OK)
+        fail_msg("%s", error.text);
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < 3 * WIDTH; x++)
+            mean[x % 3] += (double)lumi_row_f32(&raster, y)[x] / (WIDTH * HEIGHT);
+    lumi_raster_finish(&raster);
+}
+
+/* Of a grey card before a sensor whose red sees 0.6 of it, and blue 0.75. */
+static void a_raw_file_is_developed_with_the_white_balance_that_is_asked_for(void **state)
+{
+    const struct sensor sensor = {LUMI_BAYER_RGGB, 12, 0, 0, 0.6, 0.75};
+    struct lumi_image_development development = {{1, 1, 1}, false};
+    const char path[] = "test_frame_file_white.dng";
+    struct lumi_camera_frame frame;
+    struct lumi_frame_about about;
+    struct lumi_frame_file file;
+    struct lumi_image_meta meta;
+    struct lumi_error error = {0};
+    double mean[3], plain[3];
+
+    (void)state;
+    expose(&sensor, &frame);
+    uint16_t *samples = (uint16_t *)(uintptr_t)frame.data;
+    for (int i = 0; i < WIDTH * HEIGHT; i++)
+        samples[i] = (uint16_t)(1000 * (i / WIDTH % 2 == 0 && i % 2 == 0 ? 0.6 : i / WIDTH % 2 && i % 2 ? 0.75 : 1));
+    lumi_frame_about_init(&about, NULL);
+    about.white[0] = 1 / 0.6;
+    about.white[1] = 1 / 0.75;
+    assert_int_equal(lumi_frame_file_make(&frame, &about, &file, &error), LUMI_OK);
+    uint8_t *all = join(&file);
+    assert_int_equal(lumi_file_write(path, all, file.bytes, false, &error), LUMI_OK);
+    lumi_free(all);
+
+    mean_of(path, NULL, mean, &meta);
+    assert_true(fabs(meta.white[0] - 1 / 0.6) < 1e-3 && meta.white[1] == 1 && fabs(meta.white[2] - 1 / 0.75) < 1e-3);
+    assert_true(fabs(mean[0] / mean[1] - 1) < 0.01 && fabs(mean[2] / mean[1] - 1) < 0.01);
+    lumi_image_meta_finish(&meta);
+    mean_of(path, &development, plain, NULL);
+    assert_true(fabs(plain[0] / plain[1] - 0.6) < 0.01 && fabs(plain[2] / plain[1] - 0.75) < 0.01);
+    development.white[0] = 2 / 0.6;
+    development.white[1] = 2;
+    development.white[2] = 2 / 0.75;
+    mean_of(path, &development, plain, NULL);
+    assert_true(fabs(plain[0] / mean[0] - 1) < 0.01 && fabs(plain[2] / plain[1] - 1) < 0.01);
+    development.automatic = true;
+    mean_of(path, &development, mean, &meta);
+    assert_true(fabs(mean[0] / mean[1] - 1) < 0.03 && fabs(mean[2] / mean[1] - 1) < 0.03);
+    assert_true(fabs(meta.white[0] - 1 / 0.6) < 0.05 && fabs(meta.white[2] - 1 / 0.75) < 0.05);
+    lumi_image_meta_finish(&meta);
+    remove(path);
+    lumi_frame_file_finish(&file);
+    drop(&frame);
+}
+
 static void padding_of_rows_is_left_out(void **state)
 {
     (void)state;
@@ -448,6 +510,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_bayer_frame_kept_as_dng_is_developed_to_what_the_camera_saw),
         cmocka_unit_test(black_level_and_white_balance_are_the_frames_own_where_nobody_says_otherwise),
+        cmocka_unit_test(a_raw_file_is_developed_with_the_white_balance_that_is_asked_for),
         cmocka_unit_test(padding_of_rows_is_left_out),
         cmocka_unit_test(a_raw_file_tells_exposure_time_camera_and_serial_number),
         cmocka_unit_test(brightness_does_not_depend_on_what_else_is_in_the_picture),
