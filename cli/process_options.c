@@ -74,6 +74,9 @@ static int read_stages(struct lumi_parameters *parameters, struct lumi_error *er
 {
     const struct process_options *o = &process_options;
 
+    if (o->masks && !g_file_test(o->masks, G_FILE_TEST_IS_DIR))
+        return lumi_fail(error, LUMI_ERR_ARG, "--masks %s: is no folder", o->masks);
+    parameters->masks = o->masks;
     LUMI_TRY(read_choice("--calibrate", o->calibrate, &parameters->calibrate, error));
     LUMI_TRY(read_choice("--equalize", o->equalize, &parameters->equalize, error));
     LUMI_TRY(read_choice("--synthesize", o->synthesize, &parameters->synthesize, error));

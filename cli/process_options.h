@@ -9,7 +9,7 @@
 /* Values that the option tables of both commands write to. */
 struct process_options {
     char *work, *projection, *fov, *shape, *kernel;
-    char *calibrate, *equalize, *synthesize, *subsample, *prefilter, *stand; /* which stages there are */
+    char *masks, *calibrate, *equalize, *synthesize, *subsample, *prefilter, *stand; /* which stages there are */
     double density, pixels_per_degree, near_m, far_m, gp, disk_scale;
     int neighbours, quality, cluster, threads;
     gint64 target_bytes;
@@ -22,6 +22,7 @@ extern const struct process_options process_defaults;
     {"work", 'w', 0, G_OPTION_ARG_FILENAME, &process_options.work, "where the stages keep their files (CAPTURE.work)", "DIR"}, \
     {"threads", 'j', 0, G_OPTION_ARG_INT, &process_options.threads, "threads (all)", "N"},                              \
     {"calibrate", 0, 0, G_OPTION_ARG_STRING, &process_options.calibrate, "find the cameras' poses in the pictures: auto, no, yes", "WHETHER"}, \
+    {"masks", 0, 0, G_OPTION_ARG_FILENAME, &process_options.masks, "what is black there is of no use: pictures CAMERA.png or FRAME.png", "FOLDER"}, \
     {"equalize", 0, 0, G_OPTION_ARG_STRING, &process_options.equalize, "even out exposure and vignetting between cameras: auto, no, yes", "WHETHER"}, \
     {"synthesize", 0, 0, G_OPTION_ARG_STRING, &process_options.synthesize, "views for the poles, and the stand filled in: auto, no, yes", "WHETHER"}, \
     {"subsample", 0, 0, G_OPTION_ARG_STRING, &process_options.subsample, "thin out views where they are dense: auto, no, yes", "WHETHER"}, \

@@ -1,13 +1,13 @@
 /* The stage "features". */
 #include "pipeline/calibrate/features.h"
 
+#include "pipeline/calibrate/grey.h"
 #include "pipeline/calibrate/rig_mask.h"
 #include "pipeline/calibrate/sift.h"
 #include "pipeline/calibrate/sphere_warp.h"
 #include "pipeline/run/key.h"
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
-#include "proto/image/image.h"
 
 #include <glib.h>
 #include <math.h>
@@ -81,46 +81,22 @@ static int prepare(struct worker *worker, const struct lumi_lens *lens, struct l
     return LUMI_OK;
 }
 
-static float grey_of(const struct lumi_raster *raster, int x, int y)
-{
-    static const float weight[3] = {0.2126f, 0.7152f, 0.0722f};
-    const int channels = raster->channels, used = channels < 3 ? 1 : 3;
-    float sum = 0;
-
-    for (int c = 0; c < used; c++) {
-        const int i = x * channels + c;
-        const float value = raster->sample == LUMI_U8    ? lumi_row_u8(raster, y)[i]
-                            : raster->sample == LUMI_U16 ? lumi_row_u16(raster, y)[i] * (1 / 257.0f)
-                                                         : lumi_row_f32(raster, y)[i];
-        sum += used == 1 ? value : weight[c] * value;
-    }
-    if (raster->sample == LUMI_F32)
-        sum = isfinite(sum) ? 255 * lumi_srgb_encode(sum < 0 ? 0 : sum > 16 ? 16 : sum) : 0;
-    return sum;
-}
-
-/* The picture in grey, 0..255 as seen, and its mean. *grey is released with lumi_free. */
+/* The picture in grey, and its mean. *grey is released with lumi_free. */
 static int read_grey(const char *path, const struct lumi_lens *lens, float **grey, float *mean,
                      struct lumi_error *error)
 {
-    struct lumi_raster raster;
+    int width, height;
     double sum = 0;
 
-    LUMI_TRY(lumi_image_read(path, 0, &raster, NULL, error));
-    const size_t count = (size_t)raster.width * (size_t)raster.height;
-    int code = LUMI_OK;
-    *grey = NULL;
-    if (raster.width != lens->width || raster.height != lens->height)
-        code = lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d×%d pixels, its lens %d×%d", path, raster.width,
-                         raster.height, lens->width, lens->height);
-    else if (!(*grey = lumi_alloc(count, sizeof **grey)))
-        code = lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", path);
-    for (int y = 0; code == LUMI_OK && y < raster.height; y++)
-        for (int x = 0; x < raster.width; x++)
-            sum += (*grey)[(size_t)y * (size_t)raster.width + (size_t)x] = grey_of(&raster, x, y);
+    LUMI_TRY(lumi_grey_read(path, grey, &width, &height, error));
+    if (width != lens->width || height != lens->height)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d×%d pixels, its lens %d×%d", path, width, height,
+                         lens->width, lens->height);
+    const size_t count = (size_t)width * (size_t)height;
+    for (size_t i = 0; i < count; i++)
+        sum += (*grey)[i];
     *mean = (float)(sum / (double)count / 255);
-    lumi_raster_finish(&raster);
-    return code;
+    return LUMI_OK;
 }
 
 /* Places in the resampled picture become places in the original. */

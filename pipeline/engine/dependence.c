@@ -12,7 +12,8 @@ static const struct {
 } table[] = {
     {"response", ""},
     {"merge", "response"},
-    {"features", "merge"},
+    {"masks", "merge"},
+    {"features", "merge masks"},
     {"pairs", "features"},
     {"calibrate", "merge features pairs"},
     {"subsample", "calibrate"},

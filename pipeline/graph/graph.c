@@ -4,6 +4,7 @@
 #include "pipeline/calibrate/calibrate_stage.h"
 #include "pipeline/calibrate/features.h"
 #include "pipeline/calibrate/pairs.h"
+#include "pipeline/calibrate/rig_mask.h"
 #include "pipeline/color/color_stage.h"
 #include "pipeline/color/equalize_stage.h"
 #include "pipeline/compress/compress.h"
@@ -26,6 +27,7 @@ const struct lumi_stage *const lumi_stages[] = {
     /* clang-format off */
     &lumi_stage_response,
     &lumi_stage_merge,
+    &lumi_stage_masks,
     &lumi_stage_features,
     &lumi_stage_pairs,
     &lumi_stage_calibrate,

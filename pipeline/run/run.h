@@ -47,6 +47,7 @@ struct lumi_parameters {
     double density; /* views an area that are kept, as a share of the equator's */
     double stand_m; /* how far the stand's feet are from the axis; 0: none; −1: found */
     /* merge; NULL: an sRGB response */
+    const char *masks;    /* folder of masks drawn by hand, CAMERA.png or NAME.png; NULL: none; the caller's */
     const char *response; /* "srgb", "linear", "estimate" or a file; the caller's */
     /* color; NULL, all zero: nothing is changed */
     const char *icc, *lut; /* files, the caller's */
