@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FRAMES_MAX = 64, BEYOND = 3 };
-#define STILL 5.0f       /* grey levels: the usual change of what stays */
+enum { FRAMES_MAX = 64, BEYOND = 2 };
+#define STILL 5.0f       /* grey levels: what stays changes less, mostly */
 #define STANDS_OUT 10.0f /* grey levels between an outline's two sides */
 #define OUTLINE 0.55     /* share of outline and pictures in which it stands out */
 #define SMALLEST 0.0015  /* share of the picture */
@@ -30,7 +30,8 @@ static int by_value(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* The usual distance from the usual value (median absolute deviation). */
+/* The distance from the usual value that four pictures in five keep: where the world is still in fewer, its edges are
+ * what makes the outline, and these stand out in few. */
 static float change_of(const float *const *pictures, int count, int at)
 {
     float values[FRAMES_MAX];
@@ -42,7 +43,7 @@ static float change_of(const float *const *pictures, int count, int at)
     for (int i = 0; i < count; i++)
         values[i] = fabsf(values[i] - middle);
     qsort(values, (size_t)count, sizeof *values, by_value);
-    return values[count / 2];
+    return values[count * 4 / 5];
 }
 
 /* The regions of what is still: marks one with `mark` from `from`, by a stack; returns its size. */
