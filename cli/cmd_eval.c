@@ -3,6 +3,7 @@
 #include "cli/render_options.h"
 #include "pipeline/evaluate/codec_cost.h"
 #include "pipeline/evaluate/evaluate.h"
+#include "pipeline/evaluate/flicker.h"
 #include "pipeline/evaluate/pose_error.h"
 
 #include <stdio.h>
@@ -11,7 +12,7 @@
 static struct cli_render_options shared;
 static char *truth_file, *frames_regex, *difference, *sheet, *codec, *poses, *aligned, *aligned_truth;
 static int sheet_views = 12;
-static gboolean json;
+static gboolean json, flicker;
 
 static const GOptionEntry options[] = {
     {"truth", 't', 0, G_OPTION_ARG_FILENAME, &truth_file, "pictures with poses and lenses: a transforms.json", "FILE"},
@@ -30,6 +31,8 @@ static const GOptionEntry options[] = {
      "the field's poses were found: its work folder or places file; the truth is brought over to them", "PATH"},
     {"aligned-truth", 0, 0, G_OPTION_ARG_FILENAME, &aligned_truth,
      "with --aligned: the true poses of the same pictures", "FILE"},
+    {"flicker", 0, 0, G_OPTION_ARG_NONE, &flicker,
+     "instead: how much changes from one of the truth's pictures, frames of a path, to the next that should not", NULL},
     {"json", 0, 0, G_OPTION_ARG_NONE, &json, "machine-readable", NULL},
     CLI_RENDER_OPTIONS(shared),
     {0},
@@ -88,11 +91,35 @@ out:
     return code;
 }
 
+static int run_flicker(const char *field, const struct lumi_truth_set *truth, const struct lumi_evaluate_options *how,
+                       struct lumi_error *error)
+{
+    struct lumi_flicker result;
+
+    LUMI_TRY(lumi_flicker(field, truth, how, &result, error));
+    cli_progress_end();
+    g_autofree char *text = json ? lumi_flicker_json(&result) : lumi_flicker_text(&result);
+    printf("%s%s", text, json ? "\n" : "");
+    return LUMI_OK;
+}
+
+static int run_views(const char *field, const struct lumi_truth_set *truth, const struct lumi_evaluate_options *how,
+                     struct lumi_error *error)
+{
+    struct lumi_evaluation evaluation;
+
+    LUMI_TRY(lumi_evaluate(field, truth, how, &evaluation, error));
+    cli_progress_end();
+    g_autofree char *text = json ? lumi_evaluation_json(&evaluation) : lumi_evaluation_text(&evaluation);
+    printf("%s%s", text, json ? "\n" : "");
+    lumi_evaluation_finish(&evaluation);
+    return LUMI_OK;
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     struct lumi_evaluate_options o = {
         .difference = difference, .sheet = sheet, .sheet_views = sheet_views, .progress = progress};
-    struct lumi_evaluation evaluation;
     struct lumi_truth_set truth;
 
     if (!aligned != !aligned_truth)
@@ -106,19 +133,15 @@ static int run(int argc, char **argv, struct lumi_error *error)
     if (!!truth_file + !!codec != 1)
         return lumi_fail(error, LUMI_ERR_ARG, "one of --truth FILE and --codec CAPTURE is wanted");
     LUMI_TRY(cli_check_threads(shared.threads, error));
+    if (flicker && (difference || sheet || codec))
+        return lumi_fail(error, LUMI_ERR_ARG, "--flicker goes with --truth FILE, without --difference and --sheet");
     if (codec)
         return run_codec(argv[0], error);
     LUMI_TRY(cli_render_options_apply(&shared, &o.render, error));
     LUMI_TRY(lumi_truth_read(truth_file, frames_regex, false, &truth, error));
     int code = aligned ? align(&truth, error) : LUMI_OK;
     if (code == LUMI_OK)
-        code = lumi_evaluate(argv[0], &truth, &o, &evaluation, error);
-    if (code == LUMI_OK) {
-        cli_progress_end();
-        g_autofree char *text = json ? lumi_evaluation_json(&evaluation) : lumi_evaluation_text(&evaluation);
-        printf("%s%s", text, json ? "\n" : "");
-        lumi_evaluation_finish(&evaluation);
-    }
+        code = (flicker ? run_flicker : run_views)(argv[0], &truth, &o, error);
     lumi_truth_finish(&truth);
     return code;
 }

@@ -13,27 +13,6 @@
 #define PLANE_STEPS 20 /* planes tried between farthest and nearest, before the best one is narrowed down */
 #define PLANE_VIEWS 3  /* views of the truth they are judged by */
 
-/* A truth's pixels, RGB bytes of its lens's size. */
-static int read_truth(const struct lumi_truth *truth, struct lumi_raster *picture, struct lumi_error *error)
-{
-    struct lumi_raster raw = {0};
-
-    LUMI_TRY(lumi_image_read(truth->path, 3, &raw, NULL, error));
-    if (raw.width != truth->lens.width || raw.height != truth->lens.height) {
-        int code = lumi_fail(error, LUMI_ERR_FORMAT, "%s: the picture is %d×%d, its lens %d×%d", truth->path, raw.width,
-                             raw.height, truth->lens.width, truth->lens.height);
-        lumi_raster_finish(&raw);
-        return code;
-    }
-    if (raw.sample == LUMI_U8) {
-        *picture = raw;
-        return LUMI_OK;
-    }
-    int code = lumi_raster_convert(&raw, LUMI_U8, picture);
-    lumi_raster_finish(&raw);
-    return code == LUMI_OK ? LUMI_OK : lumi_fail(error, code, "%s: no memory for the picture", truth->path);
-}
-
 /* Mean PSNR of a few views over one plane. */
 static int judge_plane(struct lumi_renderer *renderer, const struct lumi_truth_set *truth,
                        const struct lumi_raster *pictures, const int *chosen, int count, double w, double *psnr,
@@ -111,7 +90,7 @@ static int find_plane(struct lumi_renderer *renderer, const struct lumi_truth_se
     search.count = truth->count < PLANE_VIEWS ? truth->count : PLANE_VIEWS;
     for (int i = 0; i < search.count && code == LUMI_OK; i++) {
         search.chosen[i] = (int)((2 * i + 1) * (long)truth->count / (2 * search.count));
-        code = read_truth(&truth->items[search.chosen[i]], &search.pictures[i], error);
+        code = lumi_truth_picture(&truth->items[search.chosen[i]], &search.pictures[i], error);
     }
     if (code == LUMI_OK)
         code = search_plane(&search, error);
@@ -146,7 +125,7 @@ static int evaluate_view(struct lumi_renderer *renderer, const struct lumi_truth
     struct lumi_picture rendered = {0};
     int code;
 
-    LUMI_GOTO(code, out, read_truth(truth, &picture, error));
+    LUMI_GOTO(code, out, lumi_truth_picture(truth, &picture, error));
     LUMI_GOTO(code, out, lumi_renderer_draw(renderer, &truth->lens, &truth->pose, &rendered, error));
     LUMI_GOTO(
         code, out,

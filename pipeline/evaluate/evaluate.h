@@ -26,6 +26,8 @@ struct lumi_truth_set {
 int lumi_truth_read(const char *path, const char *frames, bool poses_only, struct lumi_truth_set *truth,
                     struct lumi_error *error);
 void lumi_truth_finish(struct lumi_truth_set *truth);
+/* A truth's pixels, RGB bytes of its lens's size. */
+int lumi_truth_picture(const struct lumi_truth *truth, struct lumi_raster *picture, struct lumi_error *error);
 
 struct lumi_evaluate_options {
     struct lumi_render_options render;

@@ -68,3 +68,23 @@ out:
     lumi_exchange_finish(&list);
     return code;
 }
+
+int lumi_truth_picture(const struct lumi_truth *truth, struct lumi_raster *picture, struct lumi_error *error)
+{
+    struct lumi_raster raw = {0};
+
+    LUMI_TRY(lumi_image_read(truth->path, 3, &raw, NULL, error));
+    if (raw.width != truth->lens.width || raw.height != truth->lens.height) {
+        int code = lumi_fail(error, LUMI_ERR_FORMAT, "%s: the picture is %d×%d, its lens %d×%d", truth->path, raw.width,
+                             raw.height, truth->lens.width, truth->lens.height);
+        lumi_raster_finish(&raw);
+        return code;
+    }
+    if (raw.sample == LUMI_U8) {
+        *picture = raw;
+        return LUMI_OK;
+    }
+    int code = lumi_raster_convert(&raw, LUMI_U8, picture);
+    lumi_raster_finish(&raw);
+    return code == LUMI_OK ? LUMI_OK : lumi_fail(error, code, "%s: no memory for the picture", truth->path);
+}
