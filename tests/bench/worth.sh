@@ -51,7 +51,8 @@ field() { # NAME OPTIONS...
         >"$dir/$name.log"
     [ -n "$bytes" ] || bytes=$(stat -c %s "$dir/$name.lumi")
     for side in 0 1 2 3; do
-        "$lumi" eval "$dir/$name.lumi" --truth "$dir/path/transforms.json" --frames "side$side" --flicker --json
+        numbers=$(seq -s '|' $((side * frames)) $((side * frames + frames - 1)))
+        "$lumi" eval "$dir/$name.lumi" --truth "$dir/path/transforms.json" --frames "v0*($numbers)\$" --flicker --json
     done >"$dir/$name.flicker"
     judge "$name" "$dir/$name.lumi" "$dir/truth/transforms.json"
     printf '%-28s %s bytes; %s\n' '' "$(stat -c %s "$dir/$name.lumi")" "$(awk -F '[:,}]' '
