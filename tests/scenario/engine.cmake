@@ -9,3 +9,6 @@ set_tests_properties(kill_resume_test PROPERTIES LABELS slow TIMEOUT 600)
 add_test(NAME kill_resume_long_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/kill_resume_test.sh $<TARGET_FILE:lumi>
   $<TARGET_FILE:kill_resume> long)
 set_tests_properties(kill_resume_long_test PROPERTIES LABELS "slow;long" TIMEOUT 3000)
+
+add_test(NAME engine_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/engine_test.sh $<TARGET_FILE:lumi>)
+set_tests_properties(engine_test PROPERTIES LABELS slow TIMEOUT 600)

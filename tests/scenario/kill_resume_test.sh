@@ -22,8 +22,8 @@ check() { # NAME SEED KILLS CAPTURE OPTIONS...
 }
 
 if [ "${3:-}" = long ]; then
-    "$lumi" sim shoot room --rig arc:4x9:0.2 --size 160x128 --pose-error 0.002,0.2 -o rig -j 2 >/dev/null || fail "no capture"
-    check rig 7 3 rig --calibrate auto --equalize auto --synthesize auto --subsample auto --prefilter 16
+    "$lumi" sim shoot room --rig arc:4x9:0.2 --size 160x128 --pose-error 2,0.2 --brackets -2,0,2 -o rig -j 2 >/dev/null || fail "no capture"
+    check rig 7 3 rig --calibrate auto --equalize auto --synthesize auto --subsample auto --prefilter 8
 else
     "$lumi" sim shoot room --rig planar:2x2:0.03 --size 70x50 --fov 60 -o tiny -j 2 >/dev/null || fail "no capture"
     check tiny 1 2 tiny --neighbours 3 --prefilter 4 --subsample yes
