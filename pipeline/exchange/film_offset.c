@@ -51,7 +51,7 @@ static void find_peak(const AVComplexDouble *products, int length, int first_cou
             offset->next = fmax(offset->next, products[(lag + length) % length].re * scale);
     /* Between the values, where a parabola through three of them is highest. */
     double left = products[(best - 1 + length) % length].re, here = products[(best + length) % length].re;
-    double right = products[(best + 1) % length].re, bend = left - 2 * here + right;
+    double right = products[(best + 1 + length) % length].re, bend = left - 2 * here + right;
     double part = bend < 0 ? 0.5 * (left - right) / bend : 0;
     offset->seconds = (best + fmax(-0.5, fmin(0.5, part))) / rate;
 }

@@ -64,7 +64,7 @@ for frame in c00-t00-p003 c01-t00-p008 c01-t00-p010 c02-t00-p007 c03-t00-p011; d
 done
 expect 3 "IMG_0001.JPG taken before the sweep: not used (and 6 more; --strict)" "$lumi" import bad --rig bad.rig --strict -o f
 [ ! -e f ] || fail "--strict left a capture"
-expect 0 "42 made" "$lumi" process e -o e.lumi -j 2
+expect 0 "42 made" "$lumi" process e -o e.lumi --calibrate no -j 2
 
 # Brackets, one of them short: what is missing is missing in its place.
 printf '%s\n' 'pace 0.4' 'bracket -2 0 2' 'clock c02 100 0' 'skip c01 13' 'skip c03 0' >script
@@ -73,6 +73,7 @@ expect 0 "c01: no picture of turn 0, position 4, exposure 2 of 3" "$lumi" import
 said "c03: no picture of turn 0, position 0, exposure 1 of 3"
 [ "$(frames g)" -eq $((pictures * 3 - 2)) ] || fail "$(frames g) frames of brackets"
 [ ! -e g/data/frames/c01-t00-p004-b1.JPG ] || fail "another exposure took the place of the one that is missing"
+expect 0 "merge                 48 made" "$lumi" process g -o g.lumi --calibrate no -j 2
 expect 0 "" "$lumi" import brackets --rig brackets.rig --brackets -2,0,2 -o h -j 2
 [ "$(ls g/data/frames | cksum)" = "$(ls h/data/frames | cksum)" ] || fail "--brackets gives other frames"
 
