@@ -22,11 +22,11 @@ struct lumi_run_private {
 
 void lumi_run_defaults(struct lumi_parameters *parameters)
 {
-    *parameters = (struct lumi_parameters){.calibrate = LUMI_CHOICE_NO,
-                                           .equalize = LUMI_CHOICE_NO,
-                                           .synthesize = LUMI_CHOICE_NO,
-                                           .subsample = LUMI_CHOICE_NO,
-                                           .prefilter = 0,
+    *parameters = (struct lumi_parameters){.calibrate = LUMI_CHOICE_AUTO,
+                                           .equalize = LUMI_CHOICE_AUTO,
+                                           .synthesize = LUMI_CHOICE_AUTO,
+                                           .subsample = LUMI_CHOICE_AUTO,
+                                           .prefilter = -1,
                                            .density = 1,
                                            .stand_m = -1,
                                            .geometry_precision = 5,

@@ -13,7 +13,8 @@ work_folder "${2:-}"
 size=$((1280 / shrink))x$((1024 / shrink))
 [ -d "$dir/rig.capture" ] || "$lumi" sim shoot room --rig arc16 --size $size -o "$dir/rig.capture"
 [ -d "$dir/truth" ] || "$lumi" sim truth room --from "$dir/rig.capture" --random "$views" --no-depth -o "$dir/truth"
-"$lumi" process "$dir/rig.capture" -o "$dir/rig.lumi"
+# The views as they are: what the other stages are worth is stages_worth.sh.
+"$lumi" process "$dir/rig.capture" -o "$dir/rig.lumi" --synthesize no --subsample no --prefilter 0
 machine
 "$lumi" info "$dir/rig.lumi"
 judge_heading

@@ -86,7 +86,7 @@ done
 for white in camera 1.66667,1,1.42857 1,1,1 auto daylight; do
     expect 0 "c01: its pictures do not tell when they were taken: matched by their order alone" \
         "$lumi" import raw --rig cards.rig --white-balance $white -o "raw-$white" -j 2
-    "$lumi" stage equiangular "raw-$white" -j 2 >/dev/null || fail "developing with $white"
+    "$lumi" stage equiangular "raw-$white" --calibrate no --synthesize no --subsample no -j 2 >/dev/null || fail "developing with $white"
     cat "raw-$white".work/equiangular/*.exr | cksum >"$white.sum"
 done
 for white in 1,1,1 auto; do

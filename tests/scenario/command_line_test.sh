@@ -9,12 +9,15 @@ cd "$scratch" || exit 1
 expect_line 2 "no command 'nosuch'" "$lumi" nosuch
 expect_line 2 "'sim shoot', 'sim truth'" "$lumi" sim
 expect_line 2 "'sim shoot', 'sim truth'" "$lumi" help sim
-for command in import export process render eval info verify "sim shoot" "sim truth"; do
+for command in export process render eval info verify "sim shoot" "sim truth"; do
     # shellcheck disable=SC2086
     expect_line 2 "usage: lumi $command" "$lumi" $command
     # shellcheck disable=SC2086
     expect_line 2 "--nosuch" "$lumi" $command --nosuch x
 done
+
+expect_line 2 "-o CAPTURE is needed" "$lumi" import
+expect_line 2 "--nosuch" "$lumi" import --nosuch x
 
 "$lumi" sim shoot room --rig planar:2x2:0.05 --size 64x64 -o "a ü.capture" || fail "no capture"
 for command in "import x -o y" "sim shoot room -o y" "sim truth room -o y" "render x -p 0,0,0,0,0 -o y.png" \

@@ -28,7 +28,7 @@ for stage in equiangular match depth geometry geometry-coarse; do
     [ $stage != equiangular ] || expect 3 "which has not been run" "$lumi" stage match a -w pieces --range 0:5 $options
     expect 0 "$stage: 5 made, 0 there" "$lumi" stage $stage a -w pieces --range 0:5 $options
 done
-expect 2 "the capture has images 0 to 16" "$lumi" stage depth a -w pieces --range 3:17 $options
+expect 2 "the stage 'depth' has images 0 to 16" "$lumi" stage depth a -w pieces --range 3:17 $options
 "$lumi" stage compress a -w pieces $options >/dev/null || fail "stage compress"
 same one.lumi pieces/compress/all.lumi "pieces"
 
