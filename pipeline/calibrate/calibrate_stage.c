@@ -165,7 +165,7 @@ char *lumi_calibrate_line(const struct lumi_run *run)
 
 const struct lumi_stage lumi_stage_calibrate = {.name = "calibrate",
                                                 .title = "calibrating",
-                                                .version = 2,
+                                                .version = 5,
                                                 .extension = ".places",
                                                 .whole = true,
                                                 .set = LUMI_SET_FRAMES,

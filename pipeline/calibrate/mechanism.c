@@ -56,17 +56,17 @@ struct problem {
 };
 
 /* What the profile says of itself; nothing is known better than a hair. */
-static void fill_sigmas(const struct lumi_mechanism *m, struct problem *p)
+static void fill_sigmas(const struct lumi_mechanism *m, double weight, struct problem *p)
 {
     const struct lumi_rig_uncertainty *u = &m->rig.uncertainty;
-    double place = fmax(u->position_m, 1e-4), turn = fmax(u->rotation, 1e-4);
+    double place = fmax(u->position_m, 1e-4) / weight, turn = fmax(u->rotation, 1e-4) / weight;
     const double mount[LUMI_MOUNT_NUMBERS] = {turn, turn, place, place, turn, turn, turn};
     const double platform[LUMI_PLATFORM_NUMBERS] = {place, place, turn, turn};
 
     memcpy(p->mount_sigma, mount, sizeof mount);
     memcpy(p->platform_sigma, platform, sizeof platform);
-    p->turn_sigma = fmax(u->turn, 1e-4);
-    p->drop_sigma = fmax(u->drop, 1e-4);
+    p->turn_sigma = fmax(u->turn, 1e-4) / weight;
+    p->drop_sigma = fmax(u->drop, 1e-4) / weight;
     p->mount = (struct lumi_near_zero){LUMI_MOUNT_NUMBERS, p->mount_sigma};
     p->platform = (struct lumi_near_zero){LUMI_PLATFORM_NUMBERS, p->platform_sigma};
     p->turn = (struct lumi_near_zero){1, &p->turn_sigma};
@@ -80,11 +80,11 @@ static bool add_prior(struct problem *p, const struct lumi_near_zero *near, doub
 }
 
 /* All blocks are in the problem, those that nothing speaks of too: their priors hold them. */
-static bool begin(struct lumi_mechanism *m, struct problem *p)
+static bool begin(struct lumi_mechanism *m, double weight, struct problem *p)
 {
     bool ok;
 
-    fill_sigmas(m, p);
+    fill_sigmas(m, weight, p);
     p->shim = shim_problem_create();
     ok = p->shim && add_prior(p, &p->platform, m->platform);
     for (int i = 0; i < m->rig.camera_count && ok; i++)
@@ -140,13 +140,29 @@ static bool add_seen(struct lumi_mechanism *m, struct lumi_bundle *b, struct pro
     return ok;
 }
 
+/* What single cameras are off by is not noise: it is the same for all that one of them sees. So all of a camera's
+ * observations together say as much as one that is off by the residuals' spread, and the priors are weighed against
+ * that; otherwise what a camera says of its place that sees the sky alone would outweigh them. */
+static double prior_weight(struct lumi_bundle *b)
+{
+    int used = 0, seen = 0;
+
+    for (int i = 0; i < b->camera_count; i++)
+        used += b->cameras[i].used;
+    for (int i = 0; i < b->observation_count; i++)
+        seen += lumi_bundle_counts(b, i);
+    lumi_bundle_residuals(b);
+    double spread = lumi_bundle_spread(b);
+    return fmax(1, isfinite(spread) ? spread : 1) * sqrt(fmax(1, used ? (double)seen / used : 1));
+}
+
 int lumi_mechanism_solve(struct lumi_mechanism *m, struct lumi_bundle *b, double loss, int iterations,
                          struct lumi_error *error)
 {
     struct mechanism_measured *measured = lumi_calloc((size_t)b->observation_count + 1, sizeof *measured);
     struct shim_options options = {.solver = SHIM_SPARSE_SCHUR, .iterations = iterations, .function_tolerance = 1e-5};
     struct problem p = {0};
-    bool ok = measured && begin(m, &p) && add_seen(m, b, &p, measured, loss);
+    bool ok = measured && begin(m, prior_weight(b), &p) && add_seen(m, b, &p, measured, loss);
     int code = solved(&p, ok, &options, error);
 
     shim_problem_destroy(p.shim);
@@ -251,7 +267,7 @@ int lumi_mechanism_fit(struct lumi_mechanism *m, const struct lumi_bundle *b, st
     m->rotation_spread = fmax(m->rig.uncertainty.rotation, 1e-4);
     for (int round = 0; round < 2 && code == LUMI_OK; round++) {
         struct problem p = {0};
-        bool ok = begin(m, &p) && add_found(m, b, &p, found);
+        bool ok = begin(m, 1, &p) && add_found(m, b, &p, found);
         code = solved(&p, ok, &options, error);
         if (code == LUMI_OK && round == 1)
             fill_found_sigmas(m, &p);

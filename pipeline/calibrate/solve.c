@@ -28,7 +28,9 @@ static double sift(struct lumi_bundle *b, double sigmas, double least)
     return spread;
 }
 
-static int free_rounds(struct lumi_bundle *b, const struct lumi_solve_settings *s, bool lenses,
+/* `wide`: the residuals to begin with, in sigmas. As long as poses are off by that, what is right and what is wrong is
+ * not told apart by less. */
+static int free_rounds(struct lumi_bundle *b, const struct lumi_solve_settings *s, bool lenses, double wide,
                        struct lumi_solve_result *result, struct lumi_error *error)
 {
     const int rounds = 3;
@@ -36,12 +38,14 @@ static int free_rounds(struct lumi_bundle *b, const struct lumi_solve_settings *
     for (int round = 0; round < rounds; round++) {
         const struct lumi_bundle_settings settings = {.lenses = s->lenses && lenses,
                                                       .shutter = s->shutter && lenses,
-                                                      .loss = round == 0 ? 4 : 2,
+                                                      .loss = round == 0   ? fmax(4, wide)
+                                                              : round == 1 ? fmax(4, wide / 4)
+                                                                           : 2,
                                                       .iterations = 12,
                                                       .tolerance = round + 1 < rounds ? 1e-3 : 1e-5};
         lumi_bundle_triangulate(b, 2);
         LUMI_TRY(lumi_bundle_solve(b, &settings, NULL, error));
-        result->spread = sift(b, round == 0 ? 6 : 4, 1);
+        result->spread = sift(b, round == 0 ? 6 : 4, round == 0 ? 8 : round == 1 ? 2 : 1);
     }
     return LUMI_OK;
 }
@@ -86,15 +90,18 @@ static int rounds(struct lumi_bundle *b, struct lumi_mechanism *m, const struct 
         position = fmax(m->rig.uncertainty.position_m, 1e-4);
         rotation = fmax(m->rig.uncertainty.rotation, 1e-4);
     }
+    lumi_bundle_triangulate(b, 2);
+    lumi_bundle_residuals(b);
+    const double wide = lumi_bundle_spread(b);
     set_priors(b, m, position, rotation);
-    LUMI_TRY(free_rounds(b, s, !m || s->lenses_first, result, error));
+    LUMI_TRY(free_rounds(b, s, !m || s->lenses_first, wide, result, error));
     if (!m)
         return LUMI_OK;
     LUMI_TRY(lumi_mechanism_fit(m, b, error));
     result->position_spread = m->position_spread;
     result->rotation_spread = m->rotation_spread;
     set_priors(b, m, fmax(m->position_spread, 1e-4), fmax(m->rotation_spread, 1e-4));
-    LUMI_TRY(free_rounds(b, s, true, result, error));
+    LUMI_TRY(free_rounds(b, s, true, 0, result, error));
     LUMI_TRY(lumi_mechanism_fit(m, b, error));
     return LUMI_OK;
 }

@@ -63,7 +63,7 @@ static void make_motions(struct world *w)
 
 static void make_world(struct world *w, double noise)
 {
-    const struct shaken_settings settings = {1, 0.002, 0.2 * DEGREE, noise, 0.03, 4000, 120};
+    const struct shaken_settings settings = {1, 0.002, 0.2 * DEGREE, noise, 0.03, 2500, 80};
     struct shaken *s = &w->shaken;
 
     *w = (struct world){0};
