@@ -9,7 +9,10 @@
 #define FLOOR_STEP 0.01 /* metres a bin */
 enum { FLOOR_WINDOW = 3, FLOOR_AROUND = 10 };
 /* Depth is not exact: what is lower than this above the floor belongs to it. */
-#define FLOOR_MARGIN 0.04
+#define FLOOR_MARGIN 0.025
+
+/* Nearer than this nothing is matched: depth there is anything. */
+#define TOO_NEAR 0.3
 
 void lumi_floor_init(struct lumi_floor *floor, double top)
 {
@@ -96,6 +99,31 @@ double lumi_stand_share(const struct lumi_stand *stand, const struct lumi_grid *
     return (double)found / (double)all;
 }
 
+/* Whether a ray comes into the hole that the cameras go round before depth could tell what is there. */
+static bool enters_near(const struct lumi_stand *stand, struct lumi_vec3 eye, struct lumi_vec3 ray)
+{
+    const double x = eye.x - stand->centre.x, y = eye.y - stand->centre.y;
+    const double a = ray.x * ray.x + ray.y * ray.y, b = x * ray.x + y * ray.y;
+    const double inside = b * b - a * (x * x + y * y - stand->narrow * stand->narrow);
+
+    if (b >= 0 || inside < 0)
+        return false;
+    const double t = (-b - sqrt(inside)) / a, z = eye.z + t * ray.z;
+    return t * lumi_length(ray) < TOO_NEAR && z < stand->centre.z && z > stand->bottom + FLOOR_MARGIN;
+}
+
+static bool blocks(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
+                   const struct lumi_raster *depth, int x, int y)
+{
+    struct lumi_vec3 point;
+    double tan_x, tan_y;
+
+    if (point_at(grid, pose, depth, x, y, &point) && lumi_stand_holds(stand, point, FLOOR_MARGIN))
+        return true;
+    lumi_grid_unproject(grid, x + 0.5, y + 0.5, &tan_x, &tan_y);
+    return enters_near(stand, pose->t, lumi_rotate(pose->r, lumi_vec3(tan_x, tan_y, 1)));
+}
+
 long lumi_stand_mask(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
                      const struct lumi_raster *depth, uint8_t *blocked)
 {
@@ -103,8 +131,7 @@ long lumi_stand_mask(const struct lumi_stand *stand, const struct lumi_grid *gri
 
     for (int y = 0; y < grid->height; y++)
         for (int x = 0; x < grid->width; x++) {
-            struct lumi_vec3 p;
-            if (!point_at(grid, pose, depth, x, y, &p) || !lumi_stand_holds(stand, p, FLOOR_MARGIN))
+            if (!blocks(stand, grid, pose, depth, x, y))
                 continue;
             blocked[(size_t)y * (size_t)grid->width + (size_t)x] = 1;
             count++;

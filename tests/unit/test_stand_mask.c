@@ -41,12 +41,12 @@ static void look_down(struct scene *scene, double radius)
                 const double hit = (-b - sqrt(root)) / a, z = o.z + hit * d.z;
                 if (hit < t && z < -0.45) {
                     t = hit;
-                    scene->column[y * WIDTH + x] = z > FLOOR + 0.05;
+                    scene->column[y * WIDTH + x] = z > FLOOR + 0.025;
                 }
             }
             lumi_row_f32(&scene->depth, y)[x] = (float)(1 / t);
         }
-    assert_true(lumi_stand_place(lumi_vec3(0, 0, 0), 0.4, 0.4, 0.5, FLOOR, &scene->stand));
+    assert_true(lumi_stand_place(lumi_vec3(0, 0, 0), 0.4, 0.15, 0.5, FLOOR, &scene->stand));
 }
 
 static void the_floor_is_found_at_its_height(void **state)
@@ -82,6 +82,21 @@ static void the_column_is_masked_and_the_floor_is_not(void **state)
     lumi_raster_finish(&scene.depth);
 }
 
+static void what_is_too_near_to_be_matched_is_blocked_whatever_its_depth(void **state)
+{
+    struct scene scene;
+    uint8_t blocked[WIDTH * HEIGHT] = {0};
+    int at_the_head;
+
+    (void)state;
+    look_down(&scene, 1e-6); /* depth sees the floor alone */
+    assert_true(lumi_stand_place(lumi_vec3(0, 0, 0), 0.4, 0.7, 0.5, FLOOR, &scene.stand));
+    lumi_stand_mask(&scene.stand, &scene.grid, &scene.pose, &scene.depth, blocked);
+    at_the_head = blocked[(HEIGHT - 2) * WIDTH + WIDTH / 2] + blocked[WIDTH + WIDTH / 2];
+    assert_int_equal(at_the_head, 1); /* towards the axis, not away from it */
+    lumi_raster_finish(&scene.depth);
+}
+
 static void without_a_column_there_is_no_stand(void **state)
 {
     struct scene scene;
@@ -111,6 +126,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_floor_is_found_at_its_height),
         cmocka_unit_test(the_column_is_masked_and_the_floor_is_not),
+        cmocka_unit_test(what_is_too_near_to_be_matched_is_blocked_whatever_its_depth),
         cmocka_unit_test(without_a_column_there_is_no_stand),
         cmocka_unit_test(a_mask_widens_by_so_many_pixels_to_all_sides),
     };
