@@ -187,6 +187,7 @@ const struct lumi_stage lumi_stage_equiangular = {
     .version = 1,
     .extension = ".exr",
     .set = LUMI_SET_DENSE,
+    .bytes_per_pixel = 60,
     .key = key,
     .begin = begin,
     .end = end,

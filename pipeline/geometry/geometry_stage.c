@@ -167,6 +167,7 @@ const struct lumi_stage lumi_stage_geometry = {
     .version = 2,
     .extension = ".mesh",
     .set = LUMI_SET_KEPT,
+    .bytes_per_pixel = 45,
     .key = key,
     .make = make,
 };
@@ -177,6 +178,7 @@ const struct lumi_stage lumi_stage_geometry_coarse = {
     .version = 2,
     .extension = ".mesh",
     .set = LUMI_SET_KEPT,
+    .bytes_per_pixel = 45,
     .key = key,
     .begin = coarse_begin,
     .end = coarse_end,
