@@ -1,6 +1,6 @@
 /* lumi calibrate lens: a lens from pictures of a board. */
 #include "cli/command.h"
-#include "pipeline/calibrate/board.h"
+#include "pipeline/calibrate/board_lens.h"
 #include "proto/base/file.h"
 #include "proto/image/image.h"
 

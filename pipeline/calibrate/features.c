@@ -13,7 +13,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Lenses that stretch small things more than this are resampled (docs/calibration.md). */
+/* Lenses that stretch small things more than this are resampled (docs/features.md). */
 #define STRETCH_MOST 1.3
 
 struct worker {

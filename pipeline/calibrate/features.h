@@ -1,5 +1,5 @@
 /* The stage "features": points of every picture that are found again in others, SIFT (Lowe 2004), one ".feat" file a
- * frame (docs/calibration-files.md). Positions are the original picture's pixels, whatever was sampled to find them. */
+ * frame (docs/features.md). Positions are the original picture's pixels, whatever was sampled to find them. */
 #ifndef LUMI_PIPELINE_CALIBRATE_FEATURES_H
 #define LUMI_PIPELINE_CALIBRATE_FEATURES_H
 

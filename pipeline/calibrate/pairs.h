@@ -1,5 +1,5 @@
 /* The stage "pairs": which features of two pictures are of the same point, for each picture with its partners of higher
- * index, one ".pairs" file a frame (docs/calibration-files.md). */
+ * index, one ".pairs" file a frame (docs/features.md). */
 #ifndef LUMI_PIPELINE_CALIBRATE_PAIRS_H
 #define LUMI_PIPELINE_CALIBRATE_PAIRS_H
 

@@ -252,7 +252,7 @@ static void choose(const struct lumi_track_graph *graph, const struct node *node
         }
 }
 
-/* What SIFT's places are good for: an eighth of a pixel, and a share of how large the feature is (docs/calibration.md).
+/* What SIFT's places are good for: an eighth of a pixel, and a share of how large the feature is (docs/features.md).
  */
 static float sigma_of(float scale)
 {

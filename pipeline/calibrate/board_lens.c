@@ -1,5 +1,5 @@
 /* A lens from pictures of a board. */
-#include "pipeline/calibrate/board.h"
+#include "pipeline/calibrate/board_lens.h"
 
 #include "pipeline/calibrate/board_shim.h"
 #include "pipeline/calibrate/ceres_shim.h"

@@ -1,6 +1,6 @@
 /* A lens from pictures of a flat board (Zhang: A Flexible New Technique for Camera Calibration, 2000). */
-#ifndef LUMI_PIPELINE_CALIBRATE_BOARD_H
-#define LUMI_PIPELINE_CALIBRATE_BOARD_H
+#ifndef LUMI_PIPELINE_CALIBRATE_BOARD_LENS_H
+#define LUMI_PIPELINE_CALIBRATE_BOARD_LENS_H
 
 #include "pipeline/calibrate/lens_slope.h"
 #include "proto/base/result.h"

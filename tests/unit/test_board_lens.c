@@ -1,5 +1,5 @@
 /* A lens from a board: true corners give the true lens; a drawn board is found; what tells nothing is refused. */
-#include "pipeline/calibrate/board.h"
+#include "pipeline/calibrate/board_lens.h"
 #include "pipeline/calibrate/rotation.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
