@@ -77,6 +77,7 @@ static int read_stages(struct lumi_parameters *parameters, struct lumi_error *er
     if (o->masks && !g_file_test(o->masks, G_FILE_TEST_IS_DIR))
         return lumi_fail(error, LUMI_ERR_ARG, "--masks %s: is no folder", o->masks);
     parameters->masks = o->masks;
+    parameters->rolling_shutter = o->rolling_shutter;
     LUMI_TRY(read_choice("--calibrate", o->calibrate, &parameters->calibrate, error));
     LUMI_TRY(read_choice("--equalize", o->equalize, &parameters->equalize, error));
     LUMI_TRY(read_choice("--synthesize", o->synthesize, &parameters->synthesize, error));

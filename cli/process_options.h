@@ -8,6 +8,7 @@
 
 /* Values that the option tables of both commands write to. */
 struct process_options {
+    gboolean rolling_shutter;
     char *work, *projection, *fov, *shape, *kernel;
     char *masks, *calibrate, *equalize, *synthesize, *subsample, *prefilter, *stand; /* which stages there are */
     double density, pixels_per_degree, near_m, far_m, gp, disk_scale;
@@ -23,6 +24,7 @@ extern const struct process_options process_defaults;
     {"threads", 'j', 0, G_OPTION_ARG_INT, &process_options.threads, "threads (all)", "N"},                              \
     {"calibrate", 0, 0, G_OPTION_ARG_STRING, &process_options.calibrate, "find the cameras' poses in the pictures: auto, no, yes", "WHETHER"}, \
     {"masks", 0, 0, G_OPTION_ARG_FILENAME, &process_options.masks, "what is black there is of no use: pictures CAMERA.png or FRAME.png", "FOLDER"}, \
+    {"rolling-shutter", 0, 0, G_OPTION_ARG_NONE, &process_options.rolling_shutter, "calibration: the rows of a picture were read one after the other while the rig turned", NULL}, \
     {"equalize", 0, 0, G_OPTION_ARG_STRING, &process_options.equalize, "even out exposure and vignetting between cameras: auto, no, yes", "WHETHER"}, \
     {"synthesize", 0, 0, G_OPTION_ARG_STRING, &process_options.synthesize, "views for the poles, and the stand filled in: auto, no, yes", "WHETHER"}, \
     {"subsample", 0, 0, G_OPTION_ARG_STRING, &process_options.subsample, "thin out views where they are dense: auto, no, yes", "WHETHER"}, \

@@ -3,6 +3,7 @@
 
 #include "cli/command.h"
 #include "cli/process_options.h"
+#include "pipeline/calibrate/calibrate_stage.h"
 #include "pipeline/engine/local.h"
 #include "pipeline/engine/slurm_run.h"
 #include "pipeline/graph/graph.h"
@@ -34,6 +35,17 @@ static double peak_memory(void)
     return 1024.0 * (double)usage.ru_maxrss;
 }
 
+static const struct lumi_run *running;
+
+/* What a person wants to know of a calibration at once; the rest is in the report. */
+static void say_calibration(void)
+{
+    g_autofree char *line = lumi_calibrate_line(running);
+
+    if (line)
+        printf("  %s; %s/calibrate/report.txt\n", line, running->work);
+}
+
 static void report(const struct lumi_stage *stage, bool done, int outputs, int skipped)
 {
     if (!done) {
@@ -46,6 +58,8 @@ static void report(const struct lumi_stage *stage, bool done, int outputs, int s
     if (!builder) {
         printf("%-18s %5d made %5d there %8.1f s %8.1f core-s %6.0f MB at most so far\n", stage->name,
                outputs - skipped, skipped, wall, cpu, peak_memory() / 1e6);
+        if (stage == &lumi_stage_calibrate)
+            say_calibration();
         fflush(stdout);
         return;
     }
@@ -113,6 +127,7 @@ static int run_local(const struct process_run *how, const struct lumi_parameters
     LUMI_TRY(lumi_slurm_check_idle(how->work, error));
     LUMI_TRY(lumi_graph_open(how->capture, how->work, parameters, record->threads, LUMI_RUN_ALONE, &run, error));
     run->progress = cli_progress;
+    running = run;
     lumi_engine_use_local(run, process_options_say);
     if (how->json) {
         builder = json_builder_new();

@@ -23,6 +23,7 @@ static int key(struct lumi_run *run, int index, struct lumi_key *key, struct lum
     (void)error;
     lumi_key_int(key, run->count);
     lumi_key_int(key, run->rig != NULL);
+    lumi_key_int(key, run->parameters.rolling_shutter);
     if (run->rig) {
         g_autofree char *text = g_malloc(LUMI_RIG_TEXT_MAX);
         lumi_rig_print(run->rig, text, LUMI_RIG_TEXT_MAX);

@@ -167,6 +167,7 @@ static int used_frames(const struct lumi_calibration *c)
  * that was seen does not agree. */
 #define LENS_BEYOND 4
 #define LENS_OUTLIERS 0.35
+#define SHUTTER_SIGMA 0.02 /* radians the rig turns while a picture is read: 1/30 s of a turn of 12 s */
 #define LENS_LOOSER 40
 
 /* Which lenses do not fit as they were given. */
@@ -227,9 +228,11 @@ static int solve(const struct lumi_run *run, struct lumi_bundle *b, struct lumi_
     struct lumi_mechanism *mechanism = c->has_mechanism ? &c->mechanism : NULL;
     const struct lumi_rig_uncertainty *u = run->rig ? &run->rig->uncertainty : NULL;
     const struct lumi_solve_settings settings = {.lenses = true,
+                                                 .shutter = run->parameters.rolling_shutter,
                                                  .position_sigma = u ? fmax(u->position_m, 1e-4) : 0.005,
                                                  .rotation_sigma = u ? fmax(u->rotation, 1e-4) : LUMI_PI / 360};
 
+    b->shutter_sigma = settings.shutter ? SHUTTER_SIGMA : 0;
     lumi_bundle_triangulate(b, 2);
     drop_blind(b, c);
     if (used_frames(c) < 3)
@@ -250,6 +253,7 @@ static void judge_frames(const struct lumi_run *run, struct lumi_bundle *b, stru
     double sum = 0;
     int count = 0;
 
+    c->shutter = b->shutter;
     for (int i = 0; i < b->observation_count; i++) {
         const struct lumi_bundle_observation *o = &b->observations[i];
         struct lumi_frame_outcome *f = &c->frames[o->camera];

@@ -67,6 +67,7 @@ struct lumi_calibration {
     struct lumi_lens_outcome *lenses;
     bool has_mechanism;
     struct lumi_mechanism mechanism;
+    double shutter; /* of the rig's turn while a picture is read, radians, where that was asked for */
     struct lumi_solve_result solved;
     double rms;       /* pixels, of all observations that count */
     GArray *findings; /* struct lumi_finding */

@@ -94,6 +94,15 @@ static void say_lenses(const struct lumi_calibration *c, GString *text)
     }
 }
 
+static void say_shutter(const struct lumi_run *run, const struct lumi_calibration *c, GString *text)
+{
+    if (run->parameters.rolling_shutter)
+        g_string_append_printf(text,
+                               "\nRolling shutter: the rig turned by %.3f° while a picture was read; poses are those "
+                               "of the middle rows\n",
+                               DEGREES * c->shutter);
+}
+
 static bool is_angle(int number)
 {
     return number != LUMI_MOUNT_RADIUS && number != LUMI_MOUNT_OFFSET;
@@ -179,6 +188,7 @@ char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibr
     }
     say_cameras(run, c, text);
     say_lenses(c, text);
+    say_shutter(run, c, text);
     say_mechanism(c, text);
     say_frames(run, c, text);
     return g_string_free(text, FALSE);

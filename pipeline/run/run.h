@@ -42,6 +42,7 @@ struct lumi_parameters {
     enum lumi_choice equalize;   /* auto: where it is calibrated */
     enum lumi_choice synthesize; /* auto: a rig that turns took it */
     enum lumi_choice subsample;  /* auto: as synthesize */
+    bool rolling_shutter;        /* the cameras read their rows one after the other while the rig turns */
     int prefilter;               /* samples a pixel, 0: none; −1: auto, as synthesize, the stage's own number */
     /* subsample, synthesize */
     double density; /* views an area that are kept, as a share of the equator's */
