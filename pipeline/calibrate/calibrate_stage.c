@@ -138,7 +138,8 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
     lumi_tracks_defaults(&settings);
     LUMI_TRY(read_evidence(run, frames, motions, error));
     LUMI_TRY(lumi_tracks_build(run, &settings, &tracks, error));
-    const struct lumi_evidence evidence = {frames, (int)motions->len, (struct lumi_motion *)(void *)motions->data};
+    const struct lumi_evidence evidence = {frames, (int)motions->len, (struct lumi_motion *)(void *)motions->data,
+                                           true};
     code = lumi_calibrate(run, &evidence, &tracks, &c, error);
     lumi_tracks_finish(&tracks);
     if (code != LUMI_OK)
@@ -166,7 +167,7 @@ char *lumi_calibrate_line(const struct lumi_run *run)
 
 const struct lumi_stage lumi_stage_calibrate = {.name = "calibrate",
                                                 .title = "calibrating",
-                                                .version = 5,
+                                                .version = 6,
                                                 .extension = ".places",
                                                 .whole = true,
                                                 .set = LUMI_SET_FRAMES,

@@ -222,13 +222,29 @@ static int solve_lenses_too(const struct lumi_run *run, struct lumi_bundle *b, s
     return LUMI_OK;
 }
 
-static int solve(const struct lumi_run *run, struct lumi_bundle *b, struct lumi_calibration *c,
+/* What lumi_solve hands back to us. */
+struct refine_context {
+    const struct lumi_run *run;
+    struct lumi_calibration *c;
+};
+
+static int refine(void *context, struct lumi_bundle *b, struct lumi_error *error)
+{
+    const struct refine_context *r = context;
+
+    return lumi_refine(r->run, b, &r->c->refined, error);
+}
+
+static int solve(const struct lumi_run *run, bool pictures, struct lumi_bundle *b, struct lumi_calibration *c,
                  struct lumi_error *error)
 {
+    struct refine_context context = {run, c};
     struct lumi_mechanism *mechanism = c->has_mechanism ? &c->mechanism : NULL;
     const struct lumi_rig_uncertainty *u = run->rig ? &run->rig->uncertainty : NULL;
     const struct lumi_solve_settings settings = {.lenses = true,
                                                  .shutter = run->parameters.rolling_shutter,
+                                                 .refine = pictures ? refine : NULL,
+                                                 .context = &context,
                                                  .position_sigma = u ? fmax(u->position_m, 1e-4) : 0.005,
                                                  .rotation_sigma = u ? fmax(u->rotation, 1e-4) : LUMI_PI / 360};
 
@@ -363,7 +379,7 @@ int lumi_calibrate(const struct lumi_run *run, const struct lumi_evidence *evide
     LUMI_GOTO(code, out, lumi_calibration_suspects(run, evidence, c, error));
     LUMI_GOTO(code, out, make_mechanism(run, c, error));
     LUMI_GOTO(code, out, make_bundle(run, tracks, c, &b, error));
-    LUMI_GOTO(code, out, solve(run, &b, c, error));
+    LUMI_GOTO(code, out, solve(run, evidence->pictures, &b, c, error));
     drop_lost(&b, c);
     judge_frames(run, &b, c);
     judge_lenses(&b, c);

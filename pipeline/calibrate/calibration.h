@@ -3,6 +3,7 @@
 #ifndef LUMI_PIPELINE_CALIBRATE_CALIBRATION_H
 #define LUMI_PIPELINE_CALIBRATE_CALIBRATION_H
 
+#include "pipeline/calibrate/refine.h"
 #include "pipeline/calibrate/solve.h"
 #include "pipeline/calibrate/tracks.h"
 
@@ -28,6 +29,7 @@ struct lumi_evidence {
     struct lumi_frame_evidence *frames; /* one a frame of the run */
     int motion_count;
     struct lumi_motion *motions;
+    bool pictures; /* can be read: points are matched anew in them (refine.h) */
 };
 
 /* Something a person should know, and do. */
@@ -68,6 +70,7 @@ struct lumi_calibration {
     bool has_mechanism;
     struct lumi_mechanism mechanism;
     double shutter; /* of the rig's turn while a picture is read, radians, where that was asked for */
+    struct lumi_refined refined;
     struct lumi_solve_result solved;
     double rms;       /* pixels, of all observations that count */
     GArray *findings; /* struct lumi_finding */

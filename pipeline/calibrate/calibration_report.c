@@ -180,6 +180,11 @@ char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibr
         g_string_append_printf(text, "; %u to look at", c->findings->len);
     g_string_append_printf(text, "\n%d points, %d observations, %d taken out; weak: %d\n", c->solved.points,
                            c->solved.observations, c->solved.outliers, all.weak);
+    if (c->refined.matched > 0)
+        g_string_append_printf(text,
+                               "%d of these places were matched anew in the pictures, %.2f px from where features "
+                               "had them (median)\n",
+                               c->refined.matched, c->refined.moved);
     if (c->findings->len)
         g_string_append(text, "\nTo look at\n");
     for (guint i = 0; i < c->findings->len; i++) {

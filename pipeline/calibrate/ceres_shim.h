@@ -1,4 +1,5 @@
-/* Ceres as C: non-linear least squares over blocks of doubles. Calls handed through, nothing decided.
+/* Ceres as C: non-linear least squares over blocks of doubles. Calls handed through; only memory is ours, for the order
+ * of addresses would decide.
  *
  * A problem is blocks (the caller's arrays, which must stay where they are while the problem lives) and residuals, each
  * a C function of some of these blocks. Solving writes into the blocks. One thread; the same problem gives the same

@@ -131,6 +131,8 @@ static int collect(struct lumi_sift *sift, const struct lumi_sift_settings *sett
                                                        .region = (int)(y / side) * REGIONS + (int)(x / side),
                                                        .order = i};
     }
+    if (count == 0)
+        return 0;
     qsort(sift->candidates, (size_t)count, sizeof *sift->candidates, by_strength);
     for (int i = 1; i < count; i++)
         if (sift->candidates[i].region == sift->candidates[i - 1].region)

@@ -50,6 +50,16 @@ static int free_rounds(struct lumi_bundle *b, const struct lumi_solve_settings *
     return LUMI_OK;
 }
 
+/* With places seen better, once more from where it is. */
+static int refined_rounds(struct lumi_bundle *b, const struct lumi_solve_settings *s, struct lumi_solve_result *result,
+                          struct lumi_error *error)
+{
+    if (!s->refine)
+        return LUMI_OK;
+    LUMI_TRY(s->refine(s->context, b, error));
+    return free_rounds(b, s, true, 0, result, error);
+}
+
 /* Lays the bundle over where its cameras were believed to be. */
 static int fix_gauge(struct lumi_bundle *b, const struct lumi_pose *believed, struct lumi_error *error)
 {
@@ -96,12 +106,13 @@ static int rounds(struct lumi_bundle *b, struct lumi_mechanism *m, const struct 
     set_priors(b, m, position, rotation);
     LUMI_TRY(free_rounds(b, s, !m || s->lenses_first, wide, result, error));
     if (!m)
-        return LUMI_OK;
+        return refined_rounds(b, s, result, error);
     LUMI_TRY(lumi_mechanism_fit(m, b, error));
     result->position_spread = m->position_spread;
     result->rotation_spread = m->rotation_spread;
     set_priors(b, m, fmax(m->position_spread, 1e-4), fmax(m->rotation_spread, 1e-4));
     LUMI_TRY(free_rounds(b, s, true, 0, result, error));
+    LUMI_TRY(refined_rounds(b, s, result, error));
     LUMI_TRY(lumi_mechanism_fit(m, b, error));
     return LUMI_OK;
 }

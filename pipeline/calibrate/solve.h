@@ -6,9 +6,13 @@
 #include "pipeline/calibrate/mechanism.h"
 
 struct lumi_solve_settings {
-    bool lenses;                           /* lenses with sigmas are solved for, at last */
-    bool lenses_first;                     /* and from the first on: they are known badly */
-    bool shutter;                          /* so is the rolling shutter */
+    bool lenses;       /* lenses with sigmas are solved for, at last */
+    bool lenses_first; /* and from the first on: they are known badly */
+    bool shutter;      /* so is the rolling shutter */
+    /* Called once poses are good: may change where points were seen, and how sure that is; then all is solved once
+     * more. NULL: nobody. */
+    int (*refine)(void *context, struct lumi_bundle *bundle, struct lumi_error *error);
+    void *context;
     double position_sigma, rotation_sigma; /* of the priors, where there is no mechanism */
 };
 

@@ -20,7 +20,8 @@ static double median_of(GArray *values)
 {
     if (!values->len)
         return 0;
-    qsort(values->data, values->len, sizeof(double), by_value);
+    if (values->len > 0)
+        qsort(values->data, values->len, sizeof(double), by_value);
     return g_array_index(values, double, values->len / 2);
 }
 

@@ -112,7 +112,8 @@ static GArray *differences(const struct shot_track *reference, const struct shot
             if (!other)
                 g_array_append_val(all, d);
         }
-    qsort(all->data, all->len, sizeof(double), by_value);
+    if (all->len > 0)
+        qsort(all->data, all->len, sizeof(double), by_value);
     return all;
 }
 
@@ -147,7 +148,8 @@ static GArray *vote(const GArray *all, double width)
             g_array_append_val(found, here);
         }
     }
-    qsort(found->data, found->len, sizeof(struct candidate), by_votes);
+    if (found->len > 0)
+        qsort(found->data, found->len, sizeof(struct candidate), by_votes);
     return found;
 }
 
@@ -246,7 +248,8 @@ static GArray *list_moments(const struct shot_track *tracks, int count, bool coa
             struct moment moment = {shot_common_time(&tracks[c], tracks[c].times[i]), c, i};
             g_array_append_val(moments, moment);
         }
-    qsort(moments->data, moments->len, sizeof(struct moment), by_time);
+    if (moments->len > 0)
+        qsort(moments->data, moments->len, sizeof(struct moment), by_time);
     return moments;
 }
 

@@ -20,7 +20,8 @@ static int by_value(const void *a, const void *b)
 /* Sorts; NaN where there is none. */
 static double median(GArray *values)
 {
-    qsort(values->data, values->len, sizeof(double), by_value);
+    if (values->len > 0)
+        qsort(values->data, values->len, sizeof(double), by_value);
     return values->len ? g_array_index(values, double, values->len / 2) : NAN;
 }
 

@@ -1,5 +1,6 @@
 lumi_test(test_features FOLDERS calibrate run base)
 lumi_test(test_pairs FOLDERS calibrate run base)
 lumi_test(test_tracks FOLDERS calibrate run base)
+lumi_test(test_patch_align FOLDERS calibrate)
 lumi_test(test_rig_mask FOLDERS calibrate run base)
 lumi_test(test_board_lens FOLDERS calibrate run image mechanism base)

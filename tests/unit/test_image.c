@@ -165,6 +165,7 @@ static void colour_and_a_named_fourth_channel_share_an_openexr_file(void **state
             assert_true(out[0] == in[0] && out[1] == in[1] && out[2] == in[2]);
             assert_true(lumi_row_f32(&depth, y)[x] == in[3]); /* no half: every bit is there */
         }
+    lumi_raster_finish(&depth);
     assert_int_equal(lumi_image_read_channel(path, "A", &depth, &error), LUMI_ERR_NOTFOUND);
     lumi_raster_finish(&raster);
     lumi_raster_finish(&colour);
