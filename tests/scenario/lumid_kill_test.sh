@@ -102,8 +102,7 @@ take() { # NAME
 }
 
 if [ "${5:-}" = operate ]; then
-    # Of so small pictures nothing is to be judged.
-    printf '\n[judge]\nblur_pixels = 1000\nexposure_stops = 20\nsharpness_share = 0\n' >>"$LUMI_SIM_RIG/lumid.conf"
+    judge_nothing
     export LUMID_ADDRESS=http://localhost:8483
     daemon='' watch='' killed=0 captures=0 proven=0
     trap 'kill -9 $daemon $watch 2>/dev/null || :' EXIT

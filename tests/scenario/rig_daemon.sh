@@ -27,6 +27,10 @@ await_daemon() {
         sleep 0.2
     done
 }
+# Of so small pictures nothing is to be judged.
+judge_nothing() {
+    printf '\n[judge]\nblur_pixels = 1000\nexposure_stops = 20\nsharpness_share = 0\n' >>"$LUMI_SIM_RIG/lumid.conf"
+}
 # Within the rig's network: the daemon, until this shell ends.
 start_daemon() { # PORT
     export LUMID_ADDRESS=http://localhost:$1

@@ -9,6 +9,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 . "$here/rig_daemon.sh"
 
 if [ "${3:-}" = operate ]; then
+    judge_nothing
     start_daemon 8481
     start_capture
     "$lumi" capture status --json | grep -q 'simulated answers: [^"]*, at 0.000 turns' ||
