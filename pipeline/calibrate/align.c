@@ -3,9 +3,9 @@
 
 #include "pipeline/calibrate/rotation.h"
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
 #include <stdbool.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* How far from its centre the ends of a camera's axes stand, in the cameras' mean distance from their middle: a
@@ -13,16 +13,9 @@
  * stand on a sphere of 70 cm. */
 #define LEVER 2.0
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 static double median_of(double *values, int count)
 {
-    qsort(values, (size_t)count, sizeof *values, by_value);
+    lumi_sort_doubles(values, count);
     return count % 2 ? values[count / 2] : (values[count / 2 - 1] + values[count / 2]) / 2;
 }
 

@@ -6,8 +6,8 @@
 #include "pipeline/calibrate/reprojection.h"
 #include "pipeline/calibrate/rotation.h"
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 int lumi_bundle_init(struct lumi_bundle *b, int lenses, int cameras, int points, int observations,
@@ -214,13 +214,6 @@ int lumi_bundle_reject(struct lumi_bundle *b, double sigmas)
     return count;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 double lumi_bundle_spread(const struct lumi_bundle *b)
 {
     double *lengths = lumi_alloc((size_t)b->observation_count + 1, sizeof *lengths), spread = NAN;
@@ -234,9 +227,8 @@ double lumi_bundle_spread(const struct lumi_bundle *b)
         if (lumi_bundle_counts(b, i) && length >= 0)
             lengths[count++] = length;
     }
-    qsort(lengths, (size_t)count, sizeof *lengths, by_value);
     if (count > 0)
-        spread = lengths[count / 2] / 1.17741; /* the median of a Rayleigh distribution of spread 1 */
+        spread = lumi_sort_median(lengths, count) / 1.17741; /* the median of a Rayleigh distribution of spread 1 */
     lumi_free(lengths);
     return spread;
 }

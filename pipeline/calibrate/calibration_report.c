@@ -1,20 +1,14 @@
 /* A calibration in words, and as JSON. */
 #include "pipeline/calibrate/calibration.h"
 
+#include "proto/base/sort.h"
+
 #include <json-glib/json-glib.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define MM 1000
 #define DEGREES (180 / LUMI_PI)
 #define WEAK_SHOWN 20
-
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
 
 struct of_camera {
     int frames, used, weak, seen, worst;
@@ -45,10 +39,8 @@ static struct of_camera sum_up(const struct lumi_run *run, const struct lumi_cal
     }
     o.rms = o.seen ? sqrt(squares / o.seen) : 0;
     if (o.used > 0) {
-        qsort(moved, (size_t)o.used, sizeof *moved, by_value);
-        qsort(turned, (size_t)o.used, sizeof *turned, by_value);
-        o.median_moved = moved[o.used / 2];
-        o.median_turned = turned[o.used / 2];
+        o.median_moved = lumi_sort_median(moved, o.used);
+        o.median_turned = lumi_sort_median(turned, o.used);
         o.worst_moved = moved[o.used - 1];
         o.worst_turned = turned[o.used - 1];
     }

@@ -2,9 +2,9 @@
 #include "pipeline/calibrate/mask_find.h"
 
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { FRAMES_MAX = 64, BEYOND = 2 };
@@ -23,13 +23,6 @@ int lumi_mask_down(const struct lumi_mask *mask)
     return (mask->height + mask->block - 1) / mask->block;
 }
 
-static int by_value(const void *left, const void *right)
-{
-    const float a = *(const float *)left, b = *(const float *)right;
-
-    return (a > b) - (a < b);
-}
-
 /* The distance from the usual value that four pictures in five keep: where the world is still in fewer, its edges are
  * what makes the outline, and these stand out in few. */
 static float change_of(const float *const *pictures, int count, int at)
@@ -38,11 +31,11 @@ static float change_of(const float *const *pictures, int count, int at)
 
     for (int i = 0; i < count; i++)
         values[i] = pictures[i][at];
-    qsort(values, (size_t)count, sizeof *values, by_value);
+    lumi_sort_floats(values, count);
     const float middle = values[count / 2];
     for (int i = 0; i < count; i++)
         values[i] = fabsf(values[i] - middle);
-    qsort(values, (size_t)count, sizeof *values, by_value);
+    lumi_sort_floats(values, count);
     return values[count * 4 / 5];
 }
 

@@ -7,8 +7,8 @@
 #include "pipeline/calibrate/priors.h"
 #include "pipeline/calibrate/rotation.h"
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 const char *const lumi_mount_names[LUMI_MOUNT_NUMBERS] = {"angle", "azimuth", "radius", "offset",
@@ -173,20 +173,12 @@ int lumi_mechanism_solve(struct lumi_mechanism *m, struct lumi_bundle *b, double
     return code;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 /* Robust standard deviation of numbers about 0; reorders them. */
 static double spread_of(double *values, int count)
 {
     for (int i = 0; i < count; i++)
         values[i] = fabs(values[i]);
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    return count ? 1.4826 * values[count / 2] : NAN;
+    return count ? 1.4826 * lumi_sort_median(values, count) : NAN;
 }
 
 /* How far the bundle's cameras are beside the mechanism's. */

@@ -1,9 +1,10 @@
 /* Which pictures are matched with which: neighbours, by the poses that are known before. */
 #include "pipeline/calibrate/pairs.h"
 
+#include "proto/base/sort.h"
+
 #include <glib.h>
 #include <math.h>
-#include <stdlib.h>
 
 /* Of each picture's eight directions the two nearest, then the nearest of all; and whoever chose it. */
 enum { SECTORS = 8, CHOSEN = 10, CLOSE = 48 };
@@ -67,11 +68,6 @@ static int choose(const struct lumi_run *run, int index, double limit, int chose
     return result;
 }
 
-static int by_number(const void *left, const void *right)
-{
-    return *(const int *)left - *(const int *)right;
-}
-
 int lumi_pairs_choose(const struct lumi_run *run, int index, int **partners)
 {
     const double limit = cos(half_view(&run->sources[index].lens));
@@ -93,6 +89,6 @@ int lumi_pairs_choose(const struct lumi_run *run, int index, int **partners)
         if (chose && !there)
             (*partners)[result++] = close[i].index;
     }
-    qsort(*partners, (size_t)result, sizeof **partners, by_number);
+    lumi_sort_ints(*partners, result);
     return result;
 }

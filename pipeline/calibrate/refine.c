@@ -5,10 +5,10 @@
 #include "pipeline/calibrate/patch_align.h"
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
+#include "proto/base/sort.h"
 
 #include <glib.h>
 #include <pthread.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define BEST_SIGMA 0.04 /* pixels: what the stretch, the lens and the surface leave where noise leaves nothing */
@@ -220,13 +220,6 @@ static int match_point(void *context, int point, int thread)
     return LUMI_OK;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-
-    return x < y ? -1 : x > y;
-}
-
 static void count_all(struct refining *r, struct lumi_refined *refined)
 {
     int moved = 0;
@@ -238,8 +231,7 @@ static void count_all(struct refining *r, struct lumi_refined *refined)
         if (r->moved[i] > 0)
             r->moved[moved++] = r->moved[i];
     }
-    qsort(r->moved, (size_t)moved, sizeof *r->moved, by_value);
-    refined->moved = moved ? r->moved[moved / 2] : 0;
+    refined->moved = lumi_sort_median(r->moved, moved);
 }
 
 int lumi_refine(const struct lumi_run *run, struct lumi_bundle *b, struct lumi_refined *refined,

@@ -1,7 +1,8 @@
 /* What is wrong with pictures before anything is solved. */
 #include "pipeline/calibrate/calibration.h"
 
-#include <stdlib.h>
+#include "proto/base/sort.h"
+
 #include <string.h>
 
 #define BLACK 0.02        /* of full brightness: less is a lens cap, or a shutter that did not open */
@@ -9,20 +10,9 @@
 #define BLURRED 0.5       /* of the sharpness of the other cameras */
 #define FEWEST_MATCHES 15 /* with all neighbours together */
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 static double median_of(GArray *values)
 {
-    if (!values->len)
-        return 0;
-    if (values->len > 0)
-        qsort(values->data, values->len, sizeof(double), by_value);
-    return g_array_index(values, double, values->len / 2);
+    return lumi_sort_median((double *)(void *)values->data, (int)values->len);
 }
 
 static void find_black(const struct lumi_run *run, const struct lumi_evidence *e, struct lumi_calibration *c)

@@ -6,9 +6,9 @@
 #include "pipeline/color/equalize.h"
 
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { ROUNDS = 14, STEPS = 400 };
@@ -142,19 +142,6 @@ static void solve_linear(struct problem *s)
     }
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return x < y ? -1 : x > y;
-}
-
-static double median(double *values, int count)
-{
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    return count ? values[count / 2] : 0;
-}
-
 /* Root mean square over the channels of what is left of a point. */
 static double residual(const struct problem *s, int i)
 {
@@ -170,7 +157,7 @@ static double spread_of(struct problem *s)
 {
     for (int i = 0; i < s->point_count; i++)
         s->sizes[i] = residual(s, i);
-    return 1.4826 * median(s->sizes, s->point_count);
+    return 1.4826 * lumi_sort_median(s->sizes, s->point_count);
 }
 
 /* In units of the spread, so that the priors keep their meaning. */
@@ -215,7 +202,7 @@ static void finish(struct problem *s, const int *points, struct lumi_gains *gain
         for (int i = 0; i < s->count; i++)
             if (points[i] > 0)
                 s->sizes[count++] = s->x[3 * i + c];
-        double middle = median(s->sizes, count);
+        double middle = lumi_sort_median(s->sizes, count);
         for (int i = 0; i < s->count; i++) {
             double most = log(LUMI_GAIN_MOST / 2.0), value = points[i] > 0 ? s->x[3 * i + c] - middle : 0;
             gains->items[i].gain[c] = exp(fmax(fmin(value, most), -most));

@@ -8,6 +8,7 @@
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
+#include "proto/base/sort.h"
 #include "proto/image/image.h"
 
 #include <glib.h>
@@ -184,13 +185,6 @@ static int keep_seen(struct looking *looking)
     return kept;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return x < y ? -1 : x > y;
-}
-
 /* Median gain of a camera's pictures, in stops of the mean of the channels. */
 static double camera_stops(const struct lumi_run *run, const struct lumi_gains *gains, int camera, int *count)
 {
@@ -202,8 +196,7 @@ static double camera_stops(const struct lumi_run *run, const struct lumi_gains *
         if (run->sources[i].camera == camera && gain)
             values[(*count)++] = log2(gain->gain[0] * gain->gain[1] * gain->gain[2]) / 3;
     }
-    qsort(values, (size_t)*count, sizeof *values, by_value);
-    return *count ? values[*count / 2] : 0;
+    return lumi_sort_median(values, *count);
 }
 
 static int write_report(const struct lumi_run *run, const struct lumi_gains *gains,

@@ -2,6 +2,7 @@
 #include "pipeline/compress/cluster.h"
 
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -170,11 +171,6 @@ int lumi_clusters_make(int view_count, const struct lumi_pose *poses, int size, 
     return code;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    return *(const int *)a - *(const int *)b;
-}
-
 int lumi_coarse_views(int view_count, const struct lumi_pose *poses, int **views, int *count, struct lumi_error *error)
 {
     struct lumi_clusters clusters;
@@ -188,6 +184,6 @@ int lumi_coarse_views(int view_count, const struct lumi_pose *poses, int **views
     lumi_clusters_finish(&clusters);
     if (!*views)
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for the views of the coarse level");
-    qsort(*views, (size_t)*count, sizeof **views, ascending);
+    lumi_sort_ints(*views, *count);
     return LUMI_OK;
 }

@@ -6,11 +6,11 @@
 #include "pipeline/compress/reference_filter.h"
 
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 #include "proto/lightfield/block_difference.h"
 #include "proto/lightfield/tile_encoder.h"
 
 #include <limits.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { BLOCK = 8, SUPPORT = LUMI_DIFFERENCE_BLOCK, MARGIN = (SUPPORT - BLOCK) / 2, PAD = 32 };
@@ -210,11 +210,6 @@ struct stack {
     int noise;
 };
 
-static int by_value(const void *a, const void *b)
-{
-    return *(const int *)a - *(const int *)b;
-}
-
 static void fill_stack(const struct filter *filter, int block, struct stack *stack)
 {
     const int x = block % filter->cols * BLOCK - AROUND, y = block / filter->cols * BLOCK - AROUND;
@@ -233,7 +228,7 @@ static void fill_stack(const struct filter *filter, int block, struct stack *sta
         }
         sorted[k] = stack->sums[k];
     }
-    qsort(sorted, (size_t)filter->count, sizeof *sorted, by_value);
+    lumi_sort_ints(sorted, filter->count);
     stack->noise = sorted[filter->count / 4] + NOISE_FLOOR;
     stack->noise = stack->noise < filter->noise_most ? stack->noise : filter->noise_most;
 }
@@ -249,7 +244,7 @@ static void limit_noise(struct filter *filter, struct stack *stack)
         fill_stack(filter, i, stack);
         filter->noise[i] = stack->noise;
     }
-    qsort(filter->noise, (size_t)count, sizeof *filter->noise, by_value);
+    lumi_sort_ints(filter->noise, count);
     int middle = filter->noise[count / 2];
     filter->noise_most = 2 * middle < NOISE_MOST ? 2 * middle : NOISE_MOST;
     filter->used = middle < NOISE_MOST ? filter->count : 0;

@@ -2,11 +2,11 @@
 #include "pipeline/compress/level.h"
 
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 #include "proto/image/image.h"
 
 #include <glib.h>
 #include <math.h>
-#include <stdlib.h>
 
 static int check_size(const struct lumi_raster *raster, const struct lumi_grid *grid, const char *path,
                       struct lumi_error *error)
@@ -42,13 +42,6 @@ done:
 
 enum { SAMPLES = 5 }; /* depths a tile, each way */
 
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-
-    return x < y ? -1 : x > y;
-}
-
 /* The median of a tile's inverse depths. `depth` is of the run's grid, the tile of the level's. */
 static float tile_depth(const struct compress_level *level, const struct lumi_raster *depth, int x0, int y0)
 {
@@ -70,7 +63,7 @@ static float tile_depth(const struct compress_level *level, const struct lumi_ra
     }
     if (count == 0)
         return 0;
-    qsort(values, (size_t)count, sizeof *values, by_value);
+    lumi_sort_floats(values, count);
     return values[count / 2];
 }
 

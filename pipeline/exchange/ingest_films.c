@@ -4,10 +4,10 @@
 
 #include "pipeline/exchange/film_offset.h"
 #include "proto/base/parallel.h"
+#include "proto/base/sort.h"
 
 #include <math.h>
 #include <pthread.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define COLUMNS 16
@@ -276,8 +276,7 @@ static double typical_step(const struct ingest_film *film)
                       g_array_index(film->pictures, struct ingest_picture, i - 1).time;
         g_array_append_val(steps, step);
     }
-    g_array_sort(steps, ingest_by_value);
-    return g_array_index(steps, double, steps->len / 2);
+    return lumi_sort_median((double *)(void *)steps->data, (int)steps->len);
 }
 
 /* When a position is passed; NaN where one of the turn's marks is not known. */

@@ -69,8 +69,6 @@ int ingest_cards(struct ingest *ingest, struct lumi_error *error);
 
 /* Room for a frame a shot, none with a picture. */
 void ingest_make_frames(struct ingest *ingest, int camera);
-/* For sorting doubles. */
-int ingest_by_value(const void *a, const void *b);
 
 /* One white balance for all raw files among the chosen ones. */
 int ingest_find_white(struct ingest *ingest, struct lumi_error *error);

@@ -2,6 +2,7 @@
 #include "pipeline/exchange/ingest_priv.h"
 
 #include "proto/base/parallel.h"
+#include "proto/base/sort.h"
 
 #include <math.h>
 #include <string.h>
@@ -33,8 +34,7 @@ static bool median(const double (*whites)[3], int count, double white[3])
         for (int i = 0; i < count; i++)
             if (whites[i][1] > 0)
                 g_array_append_val(values, whites[i][c]);
-        g_array_sort(values, ingest_by_value);
-        white[c] = values->len ? g_array_index(values, double, values->len / 2) : 0;
+        white[c] = lumi_sort_median((double *)(void *)values->data, (int)values->len);
     }
     return values->len > 0;
 }

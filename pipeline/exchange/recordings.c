@@ -148,13 +148,6 @@ void ingest_make_frames(struct ingest *ingest, int c)
         ingest->cameras[c].frames[s] = (struct ingest_frame){.file = -1, .turns = NAN};
 }
 
-int ingest_by_value(const void *a, const void *b)
-{
-    const double p = *(const double *)a, q = *(const double *)b;
-
-    return p < q ? -1 : p > q;
-}
-
 /* `lumi_plan_cameras` knows those that the board fires; here it is those that record by themselves, too. */
 static void set_up(struct ingest *ingest, const struct lumi_ingest_options *options)
 {

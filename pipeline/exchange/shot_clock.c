@@ -1,6 +1,8 @@
 /* Clocks laid over each other, and pictures of one moment joined. */
 #include "pipeline/exchange/shot_match_priv.h"
 
+#include "proto/base/sort.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,13 +13,6 @@
 #define ROUNDS 6        /* of a fit */
 #define STEPS 256       /* of climbing, at most */
 #define SAME_SCORE 0.75 /* items: scores nearer to each other than this say nothing */
-
-static int by_value(const void *a, const void *b)
-{
-    const double p = *(const double *)a, q = *(const double *)b;
-
-    return p < q ? -1 : p > q;
-}
 
 /* A track's clock against the reference's. */
 struct fit {
@@ -112,8 +107,7 @@ static GArray *differences(const struct shot_track *reference, const struct shot
             if (!other)
                 g_array_append_val(all, d);
         }
-    if (all->len > 0)
-        qsort(all->data, all->len, sizeof(double), by_value);
+    lumi_sort_doubles((double *)(void *)all->data, (int)all->len);
     return all;
 }
 

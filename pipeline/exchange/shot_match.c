@@ -1,8 +1,9 @@
 /* From cameras' own lists of pictures to the shots of a sweep. */
 #include "pipeline/exchange/shot_match_priv.h"
 
+#include "proto/base/sort.h"
+
 #include <math.h>
-#include <stdlib.h>
 
 #define FINE 0.01 /* s, of a clock that tells parts of seconds */
 #define LINE 0.1  /* s, of times that a steady pace stands for */
@@ -10,19 +11,10 @@
 #define JOIN 0.35 /* of the least time between two shots: pictures of one moment */
 #define ITEMS_MAX 65536
 
-static int by_value(const void *a, const void *b)
-{
-    const double p = *(const double *)a, q = *(const double *)b;
-
-    return p < q ? -1 : p > q;
-}
-
 /* Sorts; NaN where there is none. */
 static double median(GArray *values)
 {
-    if (values->len > 0)
-        qsort(values->data, values->len, sizeof(double), by_value);
-    return values->len ? g_array_index(values, double, values->len / 2) : NAN;
+    return values->len ? lumi_sort_median((double *)(void *)values->data, (int)values->len) : NAN;
 }
 
 /* Brackets */
@@ -81,7 +73,7 @@ int lumi_shot_find_bracket(const struct lumi_shot_item *items, int count, double
                 g_array_append_val(stops, items[i].stops);
         sorted[k] = offsets[k] = median(stops);
     }
-    qsort(sorted, (size_t)period, sizeof *sorted, by_value);
+    lumi_sort_doubles(sorted, period);
     for (int k = 0; k < period; k++)
         offsets[k] = round((offsets[k] - sorted[period / 2]) * 3) / 3;
     return period;

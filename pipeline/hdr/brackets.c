@@ -1,17 +1,11 @@
 /* Exposures of brackets, as reported and as asked for. */
 #include "pipeline/hdr/brackets.h"
 
+#include "proto/base/sort.h"
+
 #include <math.h>
-#include <stdlib.h>
 
 enum { ASKED = 501 }; /* images that the median is taken over, evenly from all */
-
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return x < y ? -1 : x > y;
-}
 
 /* Of one shot, in seconds at ISO 100; 0: not reported. A camera that says no sensitivity is taken to keep it. */
 static double reported_exposure(const struct lumi_source *source, int part)
@@ -50,7 +44,7 @@ static void find_offsets(const struct lumi_run *run, struct lumi_brackets *brack
     for (int i = 0; i < kinds; i++)
         if (2 * counts[i] >= images)
             brackets->offsets[brackets->offset_count++] = offsets[i];
-    qsort(brackets->offsets, (size_t)brackets->offset_count, sizeof *brackets->offsets, by_value);
+    lumi_sort_doubles(brackets->offsets, brackets->offset_count);
 }
 
 void lumi_brackets_find(const struct lumi_run *run, struct lumi_brackets *brackets)
@@ -72,9 +66,8 @@ void lumi_brackets_find(const struct lumi_run *run, struct lumi_brackets *bracke
         if (exposure > 0)
             values[count++] = exposure * exp2(-source->parts[part].exposure_offset);
     }
-    qsort(values, (size_t)count, sizeof *values, by_value);
     if (count > 0)
-        brackets->nominal = values[count / 2];
+        brackets->nominal = lumi_sort_median(values, count);
     find_offsets(run, brackets);
 }
 

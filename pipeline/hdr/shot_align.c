@@ -4,9 +4,9 @@
 #include "pipeline/hdr/shot_align.h"
 
 #include "proto/base/memory.h"
+#include "proto/base/sort.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { LEVELS = 7, ROUNDS = 12, LEAST_SIDE = 24, LEAST_PIXELS = 300, RATIO_PIXELS = 65536 };
@@ -228,13 +228,6 @@ int lumi_shot_move(const struct lumi_raster *shot, const struct lumi_shot_shift 
     return LUMI_OK;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-
-    return x < y ? -1 : x > y;
-}
-
 double lumi_shot_ratio(const struct lumi_raster *reference, const struct lumi_raster *shot, long *pixels)
 {
     int step = 1;
@@ -253,7 +246,7 @@ double lumi_shot_ratio(const struct lumi_raster *reference, const struct lumi_ra
             if (isfinite(ratio))
                 ratios[count++] = ratio;
         }
-    qsort(ratios, (size_t)count, sizeof *ratios, by_value);
+    lumi_sort_floats(ratios, (int)count);
     double median = count ? (double)ratios[count / 2] : 0;
     lumi_free(ratios);
     *pixels = count;

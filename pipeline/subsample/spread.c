@@ -1,6 +1,8 @@
 /* Greedy thinning on the sphere, in the measure of the equator's own spacing. */
 #include "pipeline/subsample/spread.h"
 
+#include "proto/base/sort.h"
+
 #include <glib.h>
 #include <string.h>
 
@@ -26,21 +28,6 @@ static struct frame frame_at(struct lumi_vec3 point, struct lumi_vec3 centre)
     frame.east = across > 1e-9 * length ? lumi_vec3(-out.y / across, out.x / across, 0) : lumi_vec3(0, 1, 0);
     frame.north = lumi_cross(frame.up, frame.east);
     return frame;
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double p = *(const double *)a, q = *(const double *)b;
-
-    return p < q ? -1 : p > q;
-}
-
-static double median(double *values, int count)
-{
-    if (count == 0)
-        return 0;
-    qsort(values, (size_t)count, sizeof *values, compare_doubles);
-    return values[count / 2];
 }
 
 struct lumi_spacing lumi_spacing_measure(int count, const struct lumi_vec3 *points, struct lumi_vec3 centre)
@@ -71,7 +58,7 @@ struct lumi_spacing lumi_spacing_measure(int count, const struct lumi_vec3 *poin
         if (isfinite(nearest_north))
             north[norths++] = nearest_north;
     }
-    struct lumi_spacing spacing = {median(east, easts), median(north, norths)};
+    struct lumi_spacing spacing = {lumi_sort_median(east, easts), lumi_sort_median(north, norths)};
     if (!(spacing.east > 0))
         spacing.east = spacing.north;
     if (!(spacing.north > 0))

@@ -1,1 +1,2 @@
 lumi_test(test_base FOLDERS base)
+lumi_test(test_sort FOLDERS base)
