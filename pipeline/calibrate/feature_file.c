@@ -1,7 +1,7 @@
 /* Reading and writing ".feat" files. */
 #include "pipeline/calibrate/features.h"
 
-#include "proto/base/bytes.h"
+#include "pipeline/calibrate/sealed.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/base/raster.h"
@@ -9,8 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-static const char magic[8] = "LUMIFEAT";
-enum { FORMAT = 1, HEAD = 36, PLACE = 16 };
+static const struct lumi_sealed kind = {"LUMIFEAT", 1, "features"};
+enum { PLACE = 16, ITEM = PLACE + LUMI_DESCRIPTOR_SIZE, FILE_MAX = 64 + LUMI_FEATURES_MAX * ITEM };
 
 void lumi_features_finish(struct lumi_features *features)
 {
@@ -50,25 +50,14 @@ static int decode_items(struct lumi_reader *reader, const char *name, struct lum
 static int decode(struct lumi_reader *reader, const char *name, struct lumi_features *features,
                   struct lumi_error *error)
 {
-    const uint8_t *begin = lumi_read_bytes(reader, sizeof magic);
-
-    if (!begin || memcmp(begin, magic, sizeof magic))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is no file of features", name);
-    const uint32_t format = lumi_read_u32(reader);
-    if (format != FORMAT)
-        return lumi_fail(error, LUMI_ERR_VERSION, "%s: format %u; this build reads %d", name, format, FORMAT);
     const uint32_t width = lumi_read_u32(reader), height = lumi_read_u32(reader), count = lumi_read_u32(reader);
     features->mean = lumi_read_f32(reader);
     features->sharpness = lumi_read_f32(reader);
-    if (width < 1 || height < 1 || width > LUMI_RASTER_MAX || height > LUMI_RASTER_MAX || count > LUMI_FEATURES_MAX ||
-        !isfinite(features->mean) || !isfinite(features->sharpness))
+    if (reader->failed || width < 1 || height < 1 || width > LUMI_RASTER_MAX || height > LUMI_RASTER_MAX ||
+        count > LUMI_FEATURES_MAX || !isfinite(features->mean) || !isfinite(features->sharpness))
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its head is no head of features", name);
-    if (reader->size != HEAD + (size_t)count * (PLACE + LUMI_DESCRIPTOR_SIZE))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is cut short, or longer than its %u features", name, count);
-    if (lumi_crc32c(0, reader->data, reader->size - 4) !=
-        ((uint32_t)reader->data[reader->size - 4] | (uint32_t)reader->data[reader->size - 3] << 8 |
-         (uint32_t)reader->data[reader->size - 2] << 16 | (uint32_t)reader->data[reader->size - 1] << 24))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is damaged (checksum)", name);
+    if (lumi_reader_left(reader) != (size_t)count * ITEM)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is shorter or longer than its %u features", name, count);
     features->width = (int)width;
     features->height = (int)height;
     features->count = (int)count;
@@ -81,8 +70,9 @@ int lumi_features_decode(const void *data, size_t size, const char *name, struct
     struct lumi_reader reader;
 
     *features = (struct lumi_features){0};
-    lumi_reader_init(&reader, data, size);
-    int code = decode(&reader, name, features, error);
+    int code = lumi_sealed_open(&kind, data, size, name, &reader, error);
+    if (code == LUMI_OK)
+        code = decode(&reader, name, features, error);
     if (code != LUMI_OK)
         lumi_features_finish(features);
     return code;
@@ -94,8 +84,7 @@ int lumi_features_read(const char *path, struct lumi_features *features, struct 
     size_t size;
 
     *features = (struct lumi_features){0};
-    LUMI_TRY(
-        lumi_file_read(path, HEAD + (size_t)LUMI_FEATURES_MAX * (PLACE + LUMI_DESCRIPTOR_SIZE), &data, &size, error));
+    LUMI_TRY(lumi_file_read(path, FILE_MAX, &data, &size, error));
     int code = lumi_features_decode(data, size, path, features, error);
     lumi_free(data);
     return code;
@@ -105,9 +94,7 @@ int lumi_features_write(const char *path, const struct lumi_features *features, 
 {
     struct lumi_writer writer;
 
-    lumi_writer_init(&writer);
-    lumi_write_bytes(&writer, magic, sizeof magic);
-    lumi_write_u32(&writer, FORMAT);
+    lumi_sealed_begin(&kind, &writer);
     lumi_write_u32(&writer, (uint32_t)features->width);
     lumi_write_u32(&writer, (uint32_t)features->height);
     lumi_write_u32(&writer, (uint32_t)features->count);
@@ -121,10 +108,5 @@ int lumi_features_write(const char *path, const struct lumi_features *features, 
     }
     for (int i = 0; i < features->count; i++)
         lumi_write_bytes(&writer, features->items[i].descriptor, LUMI_DESCRIPTOR_SIZE);
-    if (!writer.failed)
-        lumi_write_u32(&writer, lumi_crc32c(0, writer.data, writer.size));
-    int code = writer.failed ? lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", path)
-                             : lumi_file_write(path, writer.data, writer.size, false, error);
-    lumi_writer_finish(&writer);
-    return code;
+    return lumi_sealed_save(&writer, path, error);
 }

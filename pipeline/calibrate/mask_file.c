@@ -1,15 +1,13 @@
 /* Reading and writing ".masks" files. */
 #include "pipeline/calibrate/mask_find.h"
 
-#include "proto/base/bytes.h"
+#include "pipeline/calibrate/sealed.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 #include "proto/base/raster.h"
 
-#include <string.h>
-
-static const char magic[8] = "LUMIMASK";
-enum { FORMAT = 1, MASKS_MAX = 4096, HEAD = 16, MASK = 16 };
+static const struct lumi_sealed kind = {"LUMIMASK", 1, "masks"};
+enum { MASKS_MAX = 4096 };
 
 void lumi_masks_finish(struct lumi_masks *masks)
 {
@@ -42,15 +40,10 @@ static int decode_mask(struct lumi_reader *reader, const char *name, struct lumi
 
 static int decode(struct lumi_reader *reader, const char *name, struct lumi_masks *masks, struct lumi_error *error)
 {
-    const uint8_t *begin = lumi_read_bytes(reader, sizeof magic);
+    const uint32_t count = lumi_read_u32(reader);
 
-    if (!begin || memcmp(begin, magic, sizeof magic))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is no file of masks", name);
-    const uint32_t format = lumi_read_u32(reader), count = lumi_read_u32(reader);
-    if (format != FORMAT)
-        return lumi_fail(error, LUMI_ERR_VERSION, "%s: format %u; this build reads %d", name, format, FORMAT);
-    if (reader->failed || count > MASKS_MAX || lumi_reader_left(reader) < 4)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is cut short", name);
+    if (reader->failed || count > MASKS_MAX)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its head is no head of masks", name);
     masks->items = lumi_calloc(count ? count : 1, sizeof *masks->items);
     if (!masks->items)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", name);
@@ -58,11 +51,7 @@ static int decode(struct lumi_reader *reader, const char *name, struct lumi_mask
         struct lumi_mask *mask = &masks->items[masks->count++];
         LUMI_TRY(decode_mask(reader, name, mask, error));
     }
-    if (lumi_reader_left(reader) != 4)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is cut short, or longer than its masks", name);
-    if (lumi_read_u32(reader) != lumi_crc32c(0, reader->data, reader->size - 4))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is damaged (checksum)", name);
-    return LUMI_OK;
+    return lumi_sealed_end(&kind, reader, name, error);
 }
 
 int lumi_masks_decode(const void *data, size_t size, const char *name, struct lumi_masks *masks,
@@ -71,8 +60,9 @@ int lumi_masks_decode(const void *data, size_t size, const char *name, struct lu
     struct lumi_reader reader;
 
     *masks = (struct lumi_masks){0};
-    lumi_reader_init(&reader, data, size);
-    int code = decode(&reader, name, masks, error);
+    int code = lumi_sealed_open(&kind, data, size, name, &reader, error);
+    if (code == LUMI_OK)
+        code = decode(&reader, name, masks, error);
     if (code != LUMI_OK)
         lumi_masks_finish(masks);
     return code;
@@ -94,9 +84,7 @@ int lumi_masks_write(const char *path, const struct lumi_masks *masks, struct lu
 {
     struct lumi_writer writer;
 
-    lumi_writer_init(&writer);
-    lumi_write_bytes(&writer, magic, sizeof magic);
-    lumi_write_u32(&writer, FORMAT);
+    lumi_sealed_begin(&kind, &writer);
     lumi_write_u32(&writer, (uint32_t)masks->count);
     for (int m = 0; m < masks->count; m++) {
         const struct lumi_mask *mask = &masks->items[m];
@@ -112,10 +100,5 @@ int lumi_masks_write(const char *path, const struct lumi_masks *masks, struct lu
             lumi_write_u8(&writer, byte);
         }
     }
-    if (!writer.failed)
-        lumi_write_u32(&writer, lumi_crc32c(0, writer.data, writer.size));
-    int code = writer.failed ? lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", path)
-                             : lumi_file_write(path, writer.data, writer.size, false, error);
-    lumi_writer_finish(&writer);
-    return code;
+    return lumi_sealed_save(&writer, path, error);
 }

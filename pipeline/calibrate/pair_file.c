@@ -1,16 +1,15 @@
 /* Reading and writing ".pairs" files. */
 #include "pipeline/calibrate/features.h"
 #include "pipeline/calibrate/pairs.h"
-
-#include "proto/base/bytes.h"
+#include "pipeline/calibrate/sealed.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
 
 #include <math.h>
 #include <string.h>
 
-static const char magic[8] = "LUMIPAIR";
-enum { FORMAT = 1, NAME = 64, PAIRS_MAX = 4096, HEAD = 20, PAIR = NAME + 12 + 12 * 8, MATCH = 12 };
+static const struct lumi_sealed kind = {"LUMIPAIR", 1, "pairs"};
+enum { NAME = 64, PAIRS_MAX = 4096, PAIR = NAME + 12 + 12 * 8, MATCH = 12 };
 
 void lumi_pairs_finish(struct lumi_pair_list *list)
 {
@@ -70,19 +69,10 @@ static int decode_pair(struct lumi_reader *reader, const char *name, struct lumi
 
 static int decode(struct lumi_reader *reader, const char *name, struct lumi_pair_list *list, struct lumi_error *error)
 {
-    const uint8_t *begin = lumi_read_bytes(reader, sizeof magic);
+    const uint32_t count = lumi_read_u32(reader);
 
-    if (!begin || memcmp(begin, magic, sizeof magic))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is no file of pairs", name);
-    const uint32_t format = lumi_read_u32(reader), count = lumi_read_u32(reader);
-    if (format != FORMAT)
-        return lumi_fail(error, LUMI_ERR_VERSION, "%s: format %u; this build reads %d", name, format, FORMAT);
-    if (reader->size < HEAD || count > PAIRS_MAX || count > reader->size / PAIR)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is cut short", name);
-    const uint8_t *end = reader->data + reader->size - 4;
-    if (lumi_crc32c(0, reader->data, reader->size - 4) !=
-        ((uint32_t)end[0] | (uint32_t)end[1] << 8 | (uint32_t)end[2] << 16 | (uint32_t)end[3] << 24))
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is damaged (checksum)", name);
+    if (reader->failed || count > PAIRS_MAX || count > reader->size / PAIR)
+        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: its head is no head of pairs", name);
     list->items = lumi_calloc(count ? count : 1, sizeof *list->items);
     if (!list->items)
         return lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", name);
@@ -90,9 +80,7 @@ static int decode(struct lumi_reader *reader, const char *name, struct lumi_pair
         struct lumi_pair *pair = &list->items[list->count++];
         LUMI_TRY(decode_pair(reader, name, pair, error));
     }
-    if (lumi_reader_left(reader) != 4)
-        return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is cut short, or longer than its pairs", name);
-    return LUMI_OK;
+    return lumi_sealed_end(&kind, reader, name, error);
 }
 
 int lumi_pairs_decode(const void *data, size_t size, const char *name, struct lumi_pair_list *list,
@@ -101,8 +89,9 @@ int lumi_pairs_decode(const void *data, size_t size, const char *name, struct lu
     struct lumi_reader reader;
 
     *list = (struct lumi_pair_list){0};
-    lumi_reader_init(&reader, data, size);
-    int code = decode(&reader, name, list, error);
+    int code = lumi_sealed_open(&kind, data, size, name, &reader, error);
+    if (code == LUMI_OK)
+        code = decode(&reader, name, list, error);
     if (code != LUMI_OK)
         lumi_pairs_finish(list);
     return code;
@@ -145,16 +134,9 @@ int lumi_pairs_write(const char *path, const struct lumi_pair_list *list, struct
 {
     struct lumi_writer writer;
 
-    lumi_writer_init(&writer);
-    lumi_write_bytes(&writer, magic, sizeof magic);
-    lumi_write_u32(&writer, FORMAT);
+    lumi_sealed_begin(&kind, &writer);
     lumi_write_u32(&writer, (uint32_t)list->count);
     for (int i = 0; i < list->count; i++)
         write_pair(&writer, &list->items[i]);
-    if (!writer.failed)
-        lumi_write_u32(&writer, lumi_crc32c(0, writer.data, writer.size));
-    int code = writer.failed ? lumi_fail(error, LUMI_ERR_NOMEM, "%s: not enough memory", path)
-                             : lumi_file_write(path, writer.data, writer.size, false, error);
-    lumi_writer_finish(&writer);
-    return code;
+    return lumi_sealed_save(&writer, path, error);
 }

@@ -2,6 +2,7 @@
 #ifndef LUMI_TESTS_FUZZ_CHECKS_H
 #define LUMI_TESTS_FUZZ_CHECKS_H
 
+#include "proto/base/bytes.h"
 #include "proto/base/memory.h"
 #include "proto/base/result.h"
 
@@ -30,6 +31,19 @@ static inline void with_and_without_memory(const uint8_t *data, size_t size, voi
     lumi_alloc_fail_after(data[size - 1] % 64);
     read(data, size);
     lumi_alloc_fail_after(-1);
+}
+
+/* The same for a format that ends with a CRC-32C of all before it; and the input with the checksum that fits it. */
+static inline void with_and_without_checksum(const uint8_t *data, size_t size, void (*read)(const uint8_t *, size_t))
+{
+    struct lumi_writer writer;
+
+    with_and_without_memory(data, size, read);
+    lumi_writer_init(&writer);
+    lumi_write_bytes(&writer, data, size);
+    lumi_write_u32(&writer, lumi_crc32c(0, data, size));
+    read(writer.data, writer.size);
+    lumi_writer_finish(&writer);
 }
 
 #endif

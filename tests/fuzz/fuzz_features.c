@@ -2,7 +2,6 @@
 #include "checks.h"
 
 #include "pipeline/calibrate/features.h"
-#include "proto/base/bytes.h"
 
 static void decode(const uint8_t *data, size_t size)
 {
@@ -19,13 +18,6 @@ static void decode(const uint8_t *data, size_t size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    struct lumi_writer writer;
-
-    with_and_without_memory(data, size, decode);
-    lumi_writer_init(&writer);
-    lumi_write_bytes(&writer, data, size);
-    lumi_write_u32(&writer, lumi_crc32c(0, data, size));
-    decode(writer.data, writer.size);
-    lumi_writer_finish(&writer);
+    with_and_without_checksum(data, size, decode);
     return 0;
 }

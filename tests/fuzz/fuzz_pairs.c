@@ -3,7 +3,6 @@
 
 #include "pipeline/calibrate/features.h"
 #include "pipeline/calibrate/pairs.h"
-#include "proto/base/bytes.h"
 
 static void decode(const uint8_t *data, size_t size)
 {
@@ -25,13 +24,6 @@ static void decode(const uint8_t *data, size_t size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    struct lumi_writer writer;
-
-    with_and_without_memory(data, size, decode);
-    lumi_writer_init(&writer);
-    lumi_write_bytes(&writer, data, size);
-    lumi_write_u32(&writer, lumi_crc32c(0, data, size));
-    decode(writer.data, writer.size);
-    lumi_writer_finish(&writer);
+    with_and_without_checksum(data, size, decode);
     return 0;
 }
