@@ -1,4 +1,4 @@
-/* The stages as a graph: equiangular → match → depth → geometry and geometry-coarse → compress. */
+/* The stages there are, in the order in which they are made, and a run through those that a capture wants. */
 #include "pipeline/graph/graph.h"
 
 #include "pipeline/calibrate/calibrate_stage.h"
