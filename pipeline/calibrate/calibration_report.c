@@ -1,9 +1,9 @@
 /* A calibration in words, and as JSON. */
 #include "pipeline/calibrate/calibration.h"
 
+#include "pipeline/run/json_put.h"
 #include "proto/base/sort.h"
 
-#include <json-glib/json-glib.h>
 #include <string.h>
 
 #define MM 1000
@@ -191,46 +191,25 @@ char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibr
     return g_string_free(text, FALSE);
 }
 
-static void put(JsonBuilder *b, const char *name, double value)
-{
-    json_builder_set_member_name(b, name);
-    json_builder_add_double_value(b, isfinite(value) ? value : 0);
-}
-
-static void put_count(JsonBuilder *b, const char *name, int value)
-{
-    json_builder_set_member_name(b, name);
-    json_builder_add_int_value(b, value);
-}
-
-static void put_text(JsonBuilder *b, const char *name, const char *value)
-{
-    json_builder_set_member_name(b, name);
-    json_builder_add_string_value(b, value);
-}
-
 static void put_frames(const struct lumi_run *run, const struct lumi_calibration *c, JsonBuilder *b)
 {
-    json_builder_set_member_name(b, "frames");
-    json_builder_begin_array(b);
+    lumi_put_array(b, "frames");
     for (int i = 0; i < run->count; i++) {
         const struct lumi_frame_outcome *f = &c->frames[i];
         json_builder_begin_object(b);
-        put_text(b, "name", run->sources[i].name);
-        put_text(b, "camera", run->sources[i].camera_name);
-        json_builder_set_member_name(b, "used");
-        json_builder_add_boolean_value(b, f->used);
+        lumi_put_string(b, "name", run->sources[i].name);
+        lumi_put_string(b, "camera", run->sources[i].camera_name);
+        lumi_put_bool(b, "used", f->used);
         if (!f->used)
-            put_text(b, "why", f->why);
-        put_count(b, "seen", f->seen);
-        put(b, "rms_px", f->rms);
-        put(b, "worst_px", f->worst);
-        put(b, "moved_mm", MM * f->moved_m);
-        put(b, "moved_degrees", DEGREES * f->moved_rotation);
-        put(b, "beside_mm", MM * f->beside_m);
-        put(b, "beside_degrees", DEGREES * f->beside_rotation);
-        json_builder_set_member_name(b, "weak");
-        json_builder_add_boolean_value(b, f->weak);
+            lumi_put_string(b, "why", f->why);
+        lumi_put_int(b, "seen", f->seen);
+        lumi_put_double(b, "rms_px", f->rms);
+        lumi_put_double(b, "worst_px", f->worst);
+        lumi_put_double(b, "moved_mm", MM * f->moved_m);
+        lumi_put_double(b, "moved_degrees", DEGREES * f->moved_rotation);
+        lumi_put_double(b, "beside_mm", MM * f->beside_m);
+        lumi_put_double(b, "beside_degrees", DEGREES * f->beside_rotation);
+        lumi_put_bool(b, "weak", f->weak);
         json_builder_end_object(b);
     }
     json_builder_end_array(b);
@@ -240,21 +219,19 @@ static void put_mechanism(const struct lumi_calibration *c, JsonBuilder *b)
 {
     const struct lumi_mechanism *m = &c->mechanism;
 
-    json_builder_set_member_name(b, "mechanism");
-    json_builder_begin_object(b);
-    put(b, "position_spread_mm", MM * m->position_spread);
-    put(b, "rotation_spread_degrees", DEGREES * m->rotation_spread);
+    lumi_put_object(b, "mechanism");
+    lumi_put_double(b, "position_spread_mm", MM * m->position_spread);
+    lumi_put_double(b, "rotation_spread_degrees", DEGREES * m->rotation_spread);
     for (int k = 0; k < LUMI_PLATFORM_NUMBERS; k++)
-        put(b, lumi_platform_names[k], (k < LUMI_PLATFORM_LEAN_X ? MM : DEGREES) * m->platform[k]);
-    json_builder_set_member_name(b, "cameras");
-    json_builder_begin_array(b);
+        lumi_put_double(b, lumi_platform_names[k], (k < LUMI_PLATFORM_LEAN_X ? MM : DEGREES) * m->platform[k]);
+    lumi_put_array(b, "cameras");
     for (int i = 0; i < m->rig.camera_count; i++) {
         json_builder_begin_object(b);
-        put_text(b, "name", m->rig.cameras[i].name);
+        lumi_put_string(b, "name", m->rig.cameras[i].name);
         for (int k = 0; k < LUMI_MOUNT_NUMBERS; k++) {
             g_autofree char *sigma = g_strdup_printf("%s_sigma", lumi_mount_names[k]);
-            put(b, lumi_mount_names[k], (is_angle(k) ? DEGREES : MM) * m->mount[i][k]);
-            put(b, sigma, (is_angle(k) ? DEGREES : MM) * m->mount_sigma[i][k]);
+            lumi_put_double(b, lumi_mount_names[k], (is_angle(k) ? DEGREES : MM) * m->mount[i][k]);
+            lumi_put_double(b, sigma, (is_angle(k) ? DEGREES : MM) * m->mount_sigma[i][k]);
         }
         json_builder_end_object(b);
     }
@@ -264,19 +241,17 @@ static void put_mechanism(const struct lumi_calibration *c, JsonBuilder *b)
 
 static void put_lenses(const struct lumi_calibration *c, JsonBuilder *b)
 {
-    json_builder_set_member_name(b, "lenses");
-    json_builder_begin_array(b);
+    lumi_put_array(b, "lenses");
     for (int i = 0; i < c->lens_count; i++) {
         const struct lumi_lens_outcome *l = &c->lenses[i];
         json_builder_begin_object(b);
-        put_text(b, "camera", l->name);
-        put_count(b, "frames", l->frames);
-        put_count(b, "observations", l->observations);
-        put(b, "covered", l->covered);
-        put(b, "focal_before_px", l->before.fx);
-        put(b, "focal_px", l->after.fx);
-        json_builder_set_member_name(b, "self_calibrated");
-        json_builder_add_boolean_value(b, l->self_calibrated);
+        lumi_put_string(b, "camera", l->name);
+        lumi_put_int(b, "frames", l->frames);
+        lumi_put_int(b, "observations", l->observations);
+        lumi_put_double(b, "covered", l->covered);
+        lumi_put_double(b, "focal_before_px", l->before.fx);
+        lumi_put_double(b, "focal_px", l->after.fx);
+        lumi_put_bool(b, "self_calibrated", l->self_calibrated);
         json_builder_end_object(b);
     }
     json_builder_end_array(b);
@@ -285,27 +260,25 @@ static void put_lenses(const struct lumi_calibration *c, JsonBuilder *b)
 char *lumi_calibration_json(const struct lumi_run *run, const struct lumi_calibration *c)
 {
     g_autoptr(JsonBuilder) b = json_builder_new();
-    g_autoptr(JsonGenerator) generator = json_generator_new();
     struct of_camera all = sum_up(run, c, -1);
 
     json_builder_begin_object(b);
-    put_count(b, "pictures", c->frame_count);
-    put_count(b, "used", c->used);
-    put_count(b, "weak", all.weak);
-    put_count(b, "points", c->solved.points);
-    put_count(b, "observations", c->solved.observations);
-    put_count(b, "outliers", c->solved.outliers);
-    put(b, "rms_px", c->rms);
-    put(b, "moved_median_mm", MM * all.median_moved);
-    put(b, "moved_median_degrees", DEGREES * all.median_turned);
-    json_builder_set_member_name(b, "findings");
-    json_builder_begin_array(b);
+    lumi_put_int(b, "pictures", c->frame_count);
+    lumi_put_int(b, "used", c->used);
+    lumi_put_int(b, "weak", all.weak);
+    lumi_put_int(b, "points", c->solved.points);
+    lumi_put_int(b, "observations", c->solved.observations);
+    lumi_put_int(b, "outliers", c->solved.outliers);
+    lumi_put_double(b, "rms_px", c->rms);
+    lumi_put_double(b, "moved_median_mm", MM * all.median_moved);
+    lumi_put_double(b, "moved_median_degrees", DEGREES * all.median_turned);
+    lumi_put_array(b, "findings");
     for (guint i = 0; i < c->findings->len; i++) {
         const struct lumi_finding *f = &g_array_index(c->findings, struct lumi_finding, i);
         json_builder_begin_object(b);
-        put_text(b, "what", f->what);
-        put_text(b, "text", f->text);
-        put_count(b, "frames_lost", f->frames_lost);
+        lumi_put_string(b, "what", f->what);
+        lumi_put_string(b, "text", f->text);
+        lumi_put_int(b, "frames_lost", f->frames_lost);
         json_builder_end_object(b);
     }
     json_builder_end_array(b);
@@ -313,10 +286,6 @@ char *lumi_calibration_json(const struct lumi_run *run, const struct lumi_calibr
     if (c->has_mechanism)
         put_mechanism(c, b);
     put_frames(run, c, b);
-    json_builder_end_object(b);
-    g_autoptr(JsonNode) root = json_builder_get_root(b);
-    json_generator_set_root(generator, root);
-    json_generator_set_pretty(generator, TRUE);
-    g_autofree char *text = json_generator_to_data(generator, NULL);
+    g_autofree char *text = lumi_put_end(b, TRUE);
     return g_strconcat(text, "\n", NULL);
 }

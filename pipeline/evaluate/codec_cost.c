@@ -2,6 +2,7 @@
 #include "pipeline/evaluate/codec_cost.h"
 
 #include "pipeline/evaluate/metrics.h"
+#include "pipeline/run/json_put.h"
 #include "proto/base/memory.h"
 #include "proto/base/parallel.h"
 #include "proto/image/image.h"
@@ -10,7 +11,6 @@
 
 #include <glib.h>
 #include <inttypes.h>
-#include <json-glib/json-glib.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -229,17 +229,13 @@ char *lumi_codec_cost_json(const struct lumi_codec_cost *c)
     add_number(builder, "file_bytes", (double)c->file_bytes);
     add_number(builder, "pixels", (double)c->pixels);
     add_number(builder, "damaged_tiles", c->damaged);
-    json_builder_set_member_name(builder, "views");
-    json_builder_begin_array(builder);
+    lumi_put_array(builder, "views");
     for (int i = 0; i < c->count; i++) {
         json_builder_begin_object(builder);
-        json_builder_set_member_name(builder, "name");
-        json_builder_add_string_value(builder, c->views[i].name);
+        lumi_put_string(builder, "name", c->views[i].name);
         add_number(builder, "psnr_yuv", c->views[i].psnr_yuv);
         json_builder_end_object(builder);
     }
     json_builder_end_array(builder);
-    json_builder_end_object(builder);
-    g_autoptr(JsonNode) root = json_builder_get_root(builder);
-    return json_to_string(root, TRUE);
+    return lumi_put_end(builder, TRUE);
 }

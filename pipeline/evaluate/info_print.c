@@ -1,9 +1,10 @@
 /* What a capture or a field holds, in numbers: written for people and for programs. */
 #include "pipeline/evaluate/info.h"
 
+#include "pipeline/run/json_put.h"
+
 #include <glib.h>
 #include <inttypes.h>
-#include <json-glib/json-glib.h>
 #include <math.h>
 
 static const char *const level_names[LUMI_LEVELS] = {[LUMI_LEVEL_COARSE] = "coarse", [LUMI_LEVEL_FINE] = "fine"};
@@ -149,90 +150,65 @@ char *lumi_info_text(const struct lumi_info *info, const char *path)
     return g_string_free(text, FALSE);
 }
 
-static void add_int(JsonBuilder *builder, const char *name, uint64_t value)
-{
-    json_builder_set_member_name(builder, name);
-    json_builder_add_int_value(builder, (gint64)value);
-}
-
-static void add_double(JsonBuilder *builder, const char *name, double value)
-{
-    json_builder_set_member_name(builder, name);
-    json_builder_add_double_value(builder, value);
-}
-
-static void add_string(JsonBuilder *builder, const char *name, const char *value)
-{
-    json_builder_set_member_name(builder, name);
-    json_builder_add_string_value(builder, value);
-}
-
-static void begin(JsonBuilder *builder, const char *name)
-{
-    json_builder_set_member_name(builder, name);
-    json_builder_begin_object(builder);
-}
-
 static void capture_json(JsonBuilder *builder, const struct lumi_capture_summary *summary)
 {
     const struct lumi_capture_info *info = &summary->info;
 
-    add_int(builder, "version", (uint64_t)info->version);
-    json_builder_set_member_name(builder, "sealed");
-    json_builder_add_boolean_value(builder, info->sealed);
-    add_string(builder, "title", summary->title);
-    add_string(builder, "source", summary->source);
-    add_string(builder, "created", summary->created);
-    add_string(builder, "software", summary->software);
-    add_string(builder, "surface", summary->surface);
-    add_int(builder, "cameras", (uint64_t)info->cameras);
-    add_int(builder, "lenses", (uint64_t)info->lenses);
-    add_int(builder, "positions", (uint64_t)info->positions);
-    add_int(builder, "shots", (uint64_t)info->shots);
-    add_int(builder, "frames", (uint64_t)info->frames);
-    begin(builder, "states");
+    lumi_put_int(builder, "version", (gint64)info->version);
+    lumi_put_bool(builder, "sealed", info->sealed);
+    lumi_put_string(builder, "title", summary->title);
+    lumi_put_string(builder, "source", summary->source);
+    lumi_put_string(builder, "created", summary->created);
+    lumi_put_string(builder, "software", summary->software);
+    lumi_put_string(builder, "surface", summary->surface);
+    lumi_put_int(builder, "cameras", (gint64)info->cameras);
+    lumi_put_int(builder, "lenses", (gint64)info->lenses);
+    lumi_put_int(builder, "positions", (gint64)info->positions);
+    lumi_put_int(builder, "shots", (gint64)info->shots);
+    lumi_put_int(builder, "frames", (gint64)info->frames);
+    lumi_put_object(builder, "states");
     for (int state = 0; state < 6; state++)
-        add_int(builder, lumi_frame_state_name((enum lumi_frame_state)state), (uint64_t)info->in_state[state]);
+        lumi_put_int(builder, lumi_frame_state_name((enum lumi_frame_state)state), (gint64)info->in_state[state]);
     json_builder_end_object(builder);
-    add_int(builder, "with_pose", (uint64_t)info->with_pose);
-    begin(builder, "poses");
+    lumi_put_int(builder, "with_pose", (gint64)info->with_pose);
+    lumi_put_object(builder, "poses");
     for (int source = LUMI_POSE_TRUE; source <= LUMI_POSE_IMPORTED; source++)
-        add_int(builder, lumi_pose_source_name((enum lumi_pose_source)source),
-                (uint64_t)summary->in_pose_source[source]);
+        lumi_put_int(builder, lumi_pose_source_name((enum lumi_pose_source)source),
+                     (gint64)summary->in_pose_source[source]);
     json_builder_end_object(builder);
-    add_int(builder, "width", (uint64_t)summary->width);
-    add_int(builder, "height", (uint64_t)summary->height);
-    add_int(builder, "pixels", summary->pixels);
-    begin(builder, "bytes");
-    add_int(builder, "images", (uint64_t)info->frame_bytes);
-    add_int(builder, "index", (uint64_t)info->database_bytes);
-    add_int(builder, "all", summary->total_bytes);
+    lumi_put_int(builder, "width", (gint64)summary->width);
+    lumi_put_int(builder, "height", (gint64)summary->height);
+    lumi_put_int(builder, "pixels", (gint64)summary->pixels);
+    lumi_put_object(builder, "bytes");
+    lumi_put_int(builder, "images", (gint64)info->frame_bytes);
+    lumi_put_int(builder, "index", (gint64)info->database_bytes);
+    lumi_put_int(builder, "all", (gint64)summary->total_bytes);
     json_builder_end_object(builder);
-    add_double(builder, "compression", ratio(summary->pixels * LUMI_INFO_RAW_BYTES, (uint64_t)info->frame_bytes));
+    lumi_put_double(builder, "compression", ratio(summary->pixels * LUMI_INFO_RAW_BYTES, (uint64_t)info->frame_bytes));
 }
 
 static void level_json(JsonBuilder *builder, const struct lumi_field_summary *summary, int level)
 {
     const struct lumi_field_info *info = &summary->info;
 
-    begin(builder, level_names[level]);
-    add_int(builder, "views", (uint64_t)info->view_count[level]);
-    add_int(builder, "references", (uint64_t)summary->levels[level].references);
-    add_int(builder, "width", (uint64_t)summary->levels[level].width);
-    add_int(builder, "height", (uint64_t)summary->levels[level].height);
-    add_double(builder, "fov_x_degrees", degrees(summary->levels[level].fov_x));
-    add_double(builder, "fov_y_degrees", degrees(summary->levels[level].fov_y));
-    add_int(builder, "tiles", summary->levels[level].tiles);
-    add_int(builder, "vertices", summary->levels[level].vertices);
-    add_int(builder, "triangles", summary->levels[level].triangles);
-    add_int(builder, "pixels", info->pixels[level]);
-    begin(builder, "bytes");
-    add_int(builder, "images", info->image_bytes[level]);
-    add_int(builder, "references", info->reference_bytes[level]);
-    add_int(builder, "side", info->side_bytes[level]);
-    add_int(builder, "geometry", info->geometry_bytes[level]);
+    lumi_put_object(builder, level_names[level]);
+    lumi_put_int(builder, "views", (gint64)info->view_count[level]);
+    lumi_put_int(builder, "references", (gint64)summary->levels[level].references);
+    lumi_put_int(builder, "width", (gint64)summary->levels[level].width);
+    lumi_put_int(builder, "height", (gint64)summary->levels[level].height);
+    lumi_put_double(builder, "fov_x_degrees", degrees(summary->levels[level].fov_x));
+    lumi_put_double(builder, "fov_y_degrees", degrees(summary->levels[level].fov_y));
+    lumi_put_int(builder, "tiles", (gint64)summary->levels[level].tiles);
+    lumi_put_int(builder, "vertices", (gint64)summary->levels[level].vertices);
+    lumi_put_int(builder, "triangles", (gint64)summary->levels[level].triangles);
+    lumi_put_int(builder, "pixels", (gint64)info->pixels[level]);
+    lumi_put_object(builder, "bytes");
+    lumi_put_int(builder, "images", (gint64)info->image_bytes[level]);
+    lumi_put_int(builder, "references", (gint64)info->reference_bytes[level]);
+    lumi_put_int(builder, "side", (gint64)info->side_bytes[level]);
+    lumi_put_int(builder, "geometry", (gint64)info->geometry_bytes[level]);
     json_builder_end_object(builder);
-    add_double(builder, "compression", ratio(info->pixels[level] * LUMI_INFO_RAW_BYTES, info->image_bytes[level]));
+    lumi_put_double(builder, "compression", ratio(info->pixels[level] * LUMI_INFO_RAW_BYTES, info->image_bytes[level]));
     json_builder_end_object(builder);
 }
 
@@ -240,25 +216,25 @@ static void field_json(JsonBuilder *builder, const struct lumi_field_summary *su
 {
     const struct lumi_field_info *info = &summary->info;
 
-    add_int(builder, "version", info->version);
-    add_string(builder, "surface", surface_names[info->surface]);
-    json_builder_set_member_name(builder, "centre");
-    json_builder_begin_array(builder);
+    lumi_put_int(builder, "version", (gint64)info->version);
+    lumi_put_string(builder, "surface", surface_names[info->surface]);
+    lumi_put_array(builder, "centre");
     json_builder_add_double_value(builder, info->centre.x);
     json_builder_add_double_value(builder, info->centre.y);
     json_builder_add_double_value(builder, info->centre.z);
     json_builder_end_array(builder);
-    add_double(builder, "radius", info->radius);
-    add_string(builder, "disks", shape_names[info->disk_shape]);
-    add_string(builder, "kernel", kernel_names[info->kernel]);
-    add_int(builder, "quality", (uint64_t)info->quality);
+    lumi_put_double(builder, "radius", info->radius);
+    lumi_put_string(builder, "disks", shape_names[info->disk_shape]);
+    lumi_put_string(builder, "kernel", kernel_names[info->kernel]);
+    lumi_put_int(builder, "quality", (gint64)info->quality);
     for (int level = 0; level < LUMI_LEVELS; level++)
         level_json(builder, summary, level);
-    begin(builder, "bytes");
-    add_int(builder, "index", info->index_bytes);
-    add_int(builder, "all", info->file_bytes);
+    lumi_put_object(builder, "bytes");
+    lumi_put_int(builder, "index", (gint64)info->index_bytes);
+    lumi_put_int(builder, "all", (gint64)info->file_bytes);
     json_builder_end_object(builder);
-    add_double(builder, "compression", ratio(info->pixels[LUMI_LEVEL_FINE] * LUMI_INFO_RAW_BYTES, info->file_bytes));
+    lumi_put_double(builder, "compression",
+                    ratio(info->pixels[LUMI_LEVEL_FINE] * LUMI_INFO_RAW_BYTES, info->file_bytes));
 }
 
 char *lumi_info_json(const struct lumi_info *info, const char *path)
@@ -266,15 +242,11 @@ char *lumi_info_json(const struct lumi_info *info, const char *path)
     g_autoptr(JsonBuilder) builder = json_builder_new();
 
     json_builder_begin_object(builder);
-    add_string(builder, "path", path);
-    add_string(builder, "kind", info->is_field ? "field" : "capture");
+    lumi_put_string(builder, "path", path);
+    lumi_put_string(builder, "kind", info->is_field ? "field" : "capture");
     if (info->is_field)
         field_json(builder, &info->field);
     else
         capture_json(builder, &info->capture);
-    json_builder_end_object(builder);
-    JsonNode *root = json_builder_get_root(builder);
-    char *text = json_to_string(root, FALSE);
-    json_node_unref(root);
-    return text;
+    return lumi_put_end(builder, FALSE);
 }

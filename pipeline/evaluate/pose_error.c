@@ -2,9 +2,9 @@
 #include "pipeline/evaluate/pose_error.h"
 
 #include "pipeline/exchange/exchange.h"
+#include "pipeline/run/json_put.h"
 #include "pipeline/run/places.h"
 
-#include <json-glib/json-glib.h>
 #include <string.h>
 
 #define MM 1000
@@ -172,30 +172,21 @@ char *lumi_pose_error_text(const struct lumi_pose_error *r)
                            r->worst_turned);
 }
 
-static void put(JsonBuilder *builder, const char *name, double value)
-{
-    json_builder_set_member_name(builder, name);
-    json_builder_add_double_value(builder, value);
-}
-
 char *lumi_pose_error_json(const struct lumi_pose_error *r)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
     const struct lumi_pose_distance *d = &r->distance;
 
     json_builder_begin_object(builder);
-    put(builder, "truths", r->truths);
-    put(builder, "found", d->count);
-    put(builder, "scale", r->scale);
-    put(builder, "position_median_mm", MM * d->median_m);
-    put(builder, "position_rms_mm", MM * d->rms_m);
-    put(builder, "position_worst_mm", MM * d->worst_m);
-    put(builder, "rotation_median_degrees", DEGREES * d->median_rotation);
-    put(builder, "rotation_rms_degrees", DEGREES * d->rms_rotation);
-    put(builder, "rotation_worst_degrees", DEGREES * d->worst_rotation);
-    json_builder_set_member_name(builder, "worst");
-    json_builder_add_string_value(builder, r->worst);
-    json_builder_end_object(builder);
-    g_autoptr(JsonNode) root = json_builder_get_root(builder);
-    return json_to_string(root, FALSE);
+    lumi_put_double(builder, "truths", r->truths);
+    lumi_put_double(builder, "found", d->count);
+    lumi_put_double(builder, "scale", r->scale);
+    lumi_put_double(builder, "position_median_mm", MM * d->median_m);
+    lumi_put_double(builder, "position_rms_mm", MM * d->rms_m);
+    lumi_put_double(builder, "position_worst_mm", MM * d->worst_m);
+    lumi_put_double(builder, "rotation_median_degrees", DEGREES * d->median_rotation);
+    lumi_put_double(builder, "rotation_rms_degrees", DEGREES * d->rms_rotation);
+    lumi_put_double(builder, "rotation_worst_degrees", DEGREES * d->worst_rotation);
+    lumi_put_string(builder, "worst", r->worst);
+    return lumi_put_end(builder, FALSE);
 }

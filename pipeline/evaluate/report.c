@@ -1,8 +1,9 @@
 /* An evaluation in words and in JSON. */
 #include "pipeline/evaluate/evaluate.h"
 
+#include "pipeline/run/json_put.h"
+
 #include <glib.h>
-#include <json-glib/json-glib.h>
 #include <math.h>
 
 char *lumi_evaluation_text(const struct lumi_evaluation *e)
@@ -28,14 +29,10 @@ char *lumi_evaluation_text(const struct lumi_evaluation *e)
 
 static void add_figures(JsonBuilder *builder, const struct lumi_comparison *c, double uncovered)
 {
-    json_builder_set_member_name(builder, "psnr_rgb");
-    json_builder_add_double_value(builder, c->psnr_rgb);
-    json_builder_set_member_name(builder, "psnr_yuv");
-    json_builder_add_double_value(builder, c->psnr_yuv);
-    json_builder_set_member_name(builder, "ssim");
-    json_builder_add_double_value(builder, c->ssim);
-    json_builder_set_member_name(builder, "uncovered");
-    json_builder_add_double_value(builder, uncovered);
+    lumi_put_double(builder, "psnr_rgb", c->psnr_rgb);
+    lumi_put_double(builder, "psnr_yuv", c->psnr_yuv);
+    lumi_put_double(builder, "ssim", c->ssim);
+    lumi_put_double(builder, "uncovered", uncovered);
 }
 
 char *lumi_evaluation_json(const struct lumi_evaluation *e)
@@ -43,33 +40,24 @@ char *lumi_evaluation_json(const struct lumi_evaluation *e)
     g_autoptr(JsonBuilder) builder = json_builder_new();
 
     json_builder_begin_object(builder);
-    json_builder_set_member_name(builder, "views");
-    json_builder_begin_array(builder);
+    lumi_put_array(builder, "views");
     for (int i = 0; i < e->count; i++) {
         json_builder_begin_object(builder);
-        json_builder_set_member_name(builder, "name");
-        json_builder_add_string_value(builder, e->views[i].name);
+        lumi_put_string(builder, "name", e->views[i].name);
         add_figures(builder, &e->views[i].comparison, e->views[i].uncovered);
         json_builder_end_object(builder);
     }
     json_builder_end_array(builder);
-    json_builder_set_member_name(builder, "mean");
-    json_builder_begin_object(builder);
+    lumi_put_object(builder, "mean");
     add_figures(builder, &e->mean, e->uncovered);
     json_builder_end_object(builder);
-    json_builder_set_member_name(builder, "worst");
-    json_builder_begin_object(builder);
-    json_builder_set_member_name(builder, "name");
-    json_builder_add_string_value(builder, e->views[e->worst].name);
+    lumi_put_object(builder, "worst");
+    lumi_put_string(builder, "name", e->views[e->worst].name);
     add_figures(builder, &e->views[e->worst].comparison, e->views[e->worst].uncovered);
     json_builder_end_object(builder);
     if (e->plane_distance > 0 && isfinite(e->plane_distance)) {
-        json_builder_set_member_name(builder, "plane_distance");
-        json_builder_add_double_value(builder, e->plane_distance);
+        lumi_put_double(builder, "plane_distance", e->plane_distance);
     }
-    json_builder_set_member_name(builder, "damaged_tiles");
-    json_builder_add_int_value(builder, e->damaged);
-    json_builder_end_object(builder);
-    g_autoptr(JsonNode) root = json_builder_get_root(builder);
-    return json_to_string(root, TRUE);
+    lumi_put_int(builder, "damaged_tiles", e->damaged);
+    return lumi_put_end(builder, TRUE);
 }
