@@ -20,6 +20,15 @@ struct run_fixture {
     struct lumi_pose (*pose)(int row, int column);
 };
 
+/* For fixtures to which no pose matters but that each is another: columns along x, rows along z, looking along y. */
+static inline struct lumi_pose wall_pose(int row, int column)
+{
+    struct lumi_pose pose;
+
+    lumi_pose_look(lumi_vec3(column, 0, row), lumi_vec3(0.1, 1, 0), lumi_vec3(0, 0, 1), &pose);
+    return pose;
+}
+
 /* "<folder>/capture", views "view00" and on; the folder is released by remove_run_fixture. */
 static inline char *make_run_fixture(const struct run_fixture *fixture)
 {

@@ -7,17 +7,9 @@
 
 static char *folder;
 
-static struct lumi_pose pose_of(int row, int column)
-{
-    struct lumi_pose pose;
-
-    lumi_pose_look(lumi_vec3(column, 0, row), lumi_vec3(0.1, 1, 0), lumi_vec3(0, 0, 1), &pose);
-    return pose;
-}
-
 static int make_capture(void **state)
 {
-    static const struct run_fixture fixture = {8, 6, 6, 3, 6, pose_of};
+    static const struct run_fixture fixture = {8, 6, 6, 3, 6, wall_pose};
 
     (void)state;
     folder = make_run_fixture(&fixture);
@@ -64,7 +56,7 @@ static void what_is_written_is_read_again_bit_for_bit(void **state)
     assert_int_equal(index, 1);
     for (int i = 0; i < 16; i++) {
         struct lumi_place place = {.lens = i % 2,
-                                   .pose = pose_of(i, i + 1),
+                                   .pose = wall_pose(i, i + 1),
                                    .used = i & 1,
                                    .kept = i & 2,
                                    .synthetic = i & 4,
@@ -145,7 +137,7 @@ static void calibrated_as(struct lumi_run *run, void (*change)(struct lumi_place
 
 static void drop_one_keep_some_add_a_pole(struct lumi_places *places)
 {
-    struct lumi_place pole = {.name = "pole00", .pose = pose_of(9, 9), .used = true, .kept = true, .synthetic = true};
+    struct lumi_place pole = {.name = "pole00", .pose = wall_pose(9, 9), .used = true, .kept = true, .synthetic = true};
 
     places->items[1].used = false;
     places->items[2].kept = false;
@@ -231,7 +223,7 @@ static char *make_brackets(void)
     } shots[] = {{0, 0, 0.01}, {0, -2, 0.0025}, {0, 2, 0.04}, {1, 2, 0.04}, {1, 0, 0.01}, {1, 0, 0.01}};
     char *path = g_build_filename(folder, "brackets", NULL);
     struct lumi_capture_lens lens = {.name = "lens"};
-    struct lumi_pose pose = pose_of(1, 2);
+    struct lumi_pose pose = wall_pose(1, 2);
     struct lumi_capture *capture;
     int64_t lens_id, camera, position = 0, shot, frame;
 

@@ -24,17 +24,9 @@ static char *folder;
 static atomic_int made;
 static int fail_at = -1, parameter = 1;
 
-static struct lumi_pose pose_of(int row, int column)
-{
-    struct lumi_pose pose;
-
-    lumi_pose_look(lumi_vec3(column, 0, row), lumi_vec3(0, 1, 0), lumi_vec3(0, 0, 1), &pose);
-    return pose;
-}
-
 static int make_capture(void **state)
 {
-    static const struct run_fixture fixture = {8, 6, IMAGES, 4, IMAGES - 1, pose_of}; /* the last one has no pose */
+    static const struct run_fixture fixture = {8, 6, IMAGES, 4, IMAGES - 1, wall_pose}; /* the last one has no pose */
 
     (void)state;
     folder = make_run_fixture(&fixture);
