@@ -8,15 +8,6 @@
 #include <glib.h>
 #include <math.h>
 
-static int check_size(const struct lumi_raster *raster, const struct lumi_grid *grid, const char *path,
-                      struct lumi_error *error)
-{
-    if (raster->width == grid->width && raster->height == grid->height)
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d × %d pixels, the views are %d × %d", path, raster->width,
-                     raster->height, grid->width, grid->height);
-}
-
 int compress_view_image(const struct compress_level *level, int view, struct lumi_yuv *image, struct lumi_error *error)
 {
     g_autofree char *path = lumi_run_view(level->run, level->sources[view], LUMI_VIEW_FINAL);
@@ -26,7 +17,7 @@ int compress_view_image(const struct compress_level *level, int view, struct lum
 
     *image = (struct lumi_yuv){0};
     LUMI_GOTO(code, done, lumi_image_read(path, 3, &raster, NULL, error));
-    LUMI_GOTO(code, done, check_size(&raster, &level->run->grid, path, error));
+    LUMI_GOTO(code, done, lumi_run_check_view(level->run, &raster, path, error));
     if (level->half) {
         LUMI_GOTO(code, done, lumi_warp_apply(level->half, &raster, &half, error));
         from = &half;
@@ -92,7 +83,7 @@ int compress_view_seeds(const struct compress_level *level, int view, int refere
 
     *seeds = NULL;
     LUMI_GOTO(code, done, lumi_image_read_channel(path, "W", &depth, error));
-    LUMI_GOTO(code, done, check_size(&depth, &level->run->grid, path, error));
+    LUMI_GOTO(code, done, lumi_run_check_view(level->run, &depth, path, error));
     *seeds = lumi_alloc((size_t)cols * (size_t)rows, sizeof **seeds);
     if (!*seeds)
         code = lumi_fail(error, LUMI_ERR_NOMEM, "%s: no memory for it", path);

@@ -1,6 +1,7 @@
 /* The stages "match" and "depth": which files go in and out; the most recent views are kept in memory. */
 #include "pipeline/depth/depth.h"
 #include "pipeline/depth/mvs.h"
+#include "pipeline/run/recent.h"
 #include "proto/base/memory.h"
 #include "proto/image/image.h"
 
@@ -11,15 +12,13 @@
 enum { KEPT = 40 };
 
 struct kept_view {
-    int index; /* −1: free */
-    long used;
     struct lumi_raster image, depth; /* depth: of the stage "match"; all zero in that stage itself */
 };
 
 struct depth_state {
     struct lumi_pose *poses;
     bool with_depth;
-    long clock;
+    struct lumi_recent recent; /* which view stands where in `kept` */
     struct kept_view kept[KEPT];
 };
 
@@ -38,16 +37,6 @@ static struct lumi_pose *all_poses(const struct lumi_run *run)
     return poses;
 }
 
-static void key_grid(struct lumi_key *key, const struct lumi_grid *grid)
-{
-    lumi_key_int(key, grid->width);
-    lumi_key_int(key, grid->height);
-    for (int i = 0; i <= grid->cols; i++)
-        lumi_key_double(key, grid->tan_x[i]);
-    for (int i = 0; i <= grid->rows; i++)
-        lumi_key_double(key, grid->tan_y[i]);
-}
-
 /* The view and its neighbours: their poses and their files from `stages`. */
 static void key_views(struct lumi_run *run, int index, const char *const *stages, struct lumi_key *key)
 {
@@ -61,7 +50,7 @@ static void key_views(struct lumi_run *run, int index, const char *const *stages
         for (int s = 0; stages[s]; s++)
             lumi_key_input(key, run, stages[s], views[i]);
     }
-    key_grid(key, &run->grid);
+    lumi_key_grid(key, &run->grid);
 }
 
 static int match_key(struct lumi_run *run, int index, struct lumi_key *key, struct lumi_error *error)
@@ -90,8 +79,7 @@ static int begin(struct lumi_run *run, bool with_depth, void **result)
 
     state->poses = all_poses(run);
     state->with_depth = with_depth;
-    for (int i = 0; i < KEPT; i++)
-        state->kept[i].index = -1;
+    lumi_recent_init(&state->recent, KEPT);
     *result = state;
     return LUMI_OK;
 }
@@ -113,7 +101,6 @@ static void drop(struct kept_view *kept)
     lumi_raster_finish(&kept->image);
     lumi_raster_finish(&kept->depth);
     memset(kept, 0, sizeof(*kept));
-    kept->index = -1;
 }
 
 static void end(struct lumi_run *run, void *data)
@@ -127,15 +114,6 @@ static void end(struct lumi_run *run, void *data)
     g_free(state);
 }
 
-static int check_size(const struct lumi_run *run, const struct lumi_raster *raster, const char *path,
-                      struct lumi_error *error)
-{
-    if (raster->width == run->grid.width && raster->height == run->grid.height)
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d×%d pixels, the views are %d×%d", path, raster->width,
-                     raster->height, run->grid.width, run->grid.height);
-}
-
 static int read_view(struct lumi_run *run, int index, bool with_depth, struct kept_view *kept, struct lumi_error *error)
 {
     g_autofree char *path = lumi_run_path(run, "equiangular", index, ".exr");
@@ -143,17 +121,15 @@ static int read_view(struct lumi_run *run, int index, bool with_depth, struct ke
     struct lumi_raster linear;
 
     LUMI_TRY(lumi_image_read(path, 3, &linear, NULL, error));
-    int code = check_size(run, &linear, path, error);
+    int code = lumi_run_check_view(run, &linear, path, error);
     if (code == LUMI_OK && lumi_raster_convert(&linear, LUMI_U8, &kept->image))
         code = lumi_fail(error, LUMI_ERR_NOMEM, "%s: out of memory", path);
     lumi_raster_finish(&linear);
     if (code == LUMI_OK && with_depth)
         code = lumi_image_read_channel(depth_path, "W", &kept->depth, error);
     if (code == LUMI_OK && with_depth)
-        code = check_size(run, &kept->depth, depth_path, error);
-    if (code == LUMI_OK)
-        kept->index = index;
-    else
+        code = lumi_run_check_view(run, &kept->depth, depth_path, error);
+    if (code != LUMI_OK)
         drop(kept);
     return code;
 }
@@ -162,20 +138,15 @@ static int read_view(struct lumi_run *run, int index, bool with_depth, struct ke
 static int view_of(struct lumi_run *run, struct depth_state *state, int index, struct lumi_mvs_view *view,
                    struct lumi_error *error)
 {
-    struct kept_view *oldest = &state->kept[0], *kept = NULL;
+    int slot;
 
-    for (int i = 0; i < KEPT && !kept; i++) {
-        if (state->kept[i].index == index)
-            kept = &state->kept[i];
-        if (state->kept[i].used < oldest->used)
-            oldest = &state->kept[i];
+    if (!lumi_recent_find(&state->recent, index, &slot)) {
+        drop(&state->kept[slot]);
+        LUMI_TRY(read_view(run, index, state->with_depth, &state->kept[slot], error));
+        lumi_recent_take(&state->recent, slot, index);
     }
-    if (!kept) {
-        drop(oldest);
-        LUMI_TRY(read_view(run, index, state->with_depth, oldest, error));
-        kept = oldest;
-    }
-    kept->used = ++state->clock;
+    const struct kept_view *kept = &state->kept[slot];
+
     *view = (struct lumi_mvs_view){&run->grid, state->poses[index], kept->image, kept->depth};
     return LUMI_OK;
 }

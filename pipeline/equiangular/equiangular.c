@@ -26,12 +26,7 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
     (void)error;
     lumi_key_image(k, run, index);
     lumi_key_lens(k, &run->sources[index].lens);
-    lumi_key_int(k, run->grid.width);
-    lumi_key_int(k, run->grid.height);
-    for (int i = 0; i <= run->grid.cols; i++)
-        lumi_key_double(k, run->grid.tan_x[i]);
-    for (int i = 0; i <= run->grid.rows; i++)
-        lumi_key_double(k, run->grid.tan_y[i]);
+    lumi_key_grid(k, &run->grid);
     if (run->wants.equalize)
         lumi_key_input(k, run, "equalize", -1);
     return LUMI_OK;

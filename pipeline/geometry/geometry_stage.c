@@ -46,15 +46,6 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
     return LUMI_OK;
 }
 
-static int check_size(const struct lumi_raster *raster, const struct lumi_grid *grid, const char *path,
-                      struct lumi_error *error)
-{
-    if (raster->width == grid->width && raster->height == grid->height)
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d × %d pixels, the views are %d × %d", path, raster->width,
-                     raster->height, grid->width, grid->height);
-}
-
 /* A view's picture and depth. */
 struct input {
     struct lumi_raster colour, depth;
@@ -73,9 +64,9 @@ static int read_input(const struct lumi_run *run, int index, struct input *input
 
     *input = (struct input){0};
     LUMI_TRY(lumi_image_read(colour, 3, &input->colour, NULL, error));
-    LUMI_TRY(check_size(&input->colour, &run->grid, colour, error));
+    LUMI_TRY(lumi_run_check_view(run, &input->colour, colour, error));
     LUMI_TRY(lumi_image_read_channel(depth, "W", &input->depth, error));
-    return check_size(&input->depth, &run->grid, depth, error);
+    return lumi_run_check_view(run, &input->depth, depth, error);
 }
 
 static int write_mesh(const struct lumi_run *run, int index, const struct input *input, const struct lumi_grid *grid,

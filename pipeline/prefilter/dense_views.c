@@ -41,21 +41,12 @@ void prefilter_shelf_destroy(struct prefilter_shelf *shelf)
     g_free(shelf);
 }
 
-static int check_size(const struct lumi_run *run, const struct lumi_raster *raster, const char *path,
-                      struct lumi_error *error)
-{
-    if (raster->width == run->grid.width && raster->height == run->grid.height)
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d × %d pixels, the views are %d × %d", path, raster->width,
-                     raster->height, run->grid.width, run->grid.height);
-}
-
 static int read_picture(const struct lumi_run *run, int index, struct lumi_raster *picture, struct lumi_error *error)
 {
     g_autofree char *path = lumi_run_view(run, index, LUMI_VIEW_PICTURE);
 
     LUMI_TRY(lumi_image_read(path, 3, picture, NULL, error));
-    LUMI_TRY(check_size(run, picture, path, error));
+    LUMI_TRY(lumi_run_check_view(run, picture, path, error));
     if (picture->sample != LUMI_F32)
         return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is not a picture of floats", path);
     prefilter_to_display(picture);
@@ -67,7 +58,7 @@ static int read_depth(const struct lumi_run *run, int index, struct lumi_raster 
     g_autofree char *path = lumi_run_view(run, index, LUMI_VIEW_DEPTH);
 
     LUMI_TRY(lumi_image_read_channel(path, "W", depth, error));
-    LUMI_TRY(check_size(run, depth, path, error));
+    LUMI_TRY(lumi_run_check_view(run, depth, path, error));
     for (int y = 0; y < depth->height; y++) {
         float *row = lumi_row_f32(depth, y);
         for (int x = 0; x < depth->width; x++)

@@ -169,9 +169,10 @@ void lumi_key_double(struct lumi_key *key, double value);
  * that asks fails with a line that says which to run first. */
 void lumi_key_input(struct lumi_key *key, const struct lumi_run *run, const char *stage, int index);
 
-/* The key of a stage's output whatever it is called, and that of the places the run is at: poses, lenses, flags. */
+/* A lens, a pose, the views' pixels. */
 void lumi_key_lens(struct lumi_key *key, const struct lumi_lens *lens);
 void lumi_key_pose(struct lumi_key *key, const struct lumi_pose *pose);
+void lumi_key_grid(struct lumi_key *key, const struct lumi_grid *grid);
 
 /* The picture of a frame: the file, or what the stage `merge` made of a bracket; free with g_free. And what stands for
  * it in a key. */
@@ -188,6 +189,9 @@ void lumi_key_image(struct lumi_key *key, const struct lumi_run *run, int index)
 enum lumi_view_part { LUMI_VIEW_PICTURE, LUMI_VIEW_DEPTH, LUMI_VIEW_FILTERED, LUMI_VIEW_FINAL };
 char *lumi_run_view(const struct lumi_run *run, int index, enum lumi_view_part part);
 void lumi_key_view(struct lumi_key *key, const struct lumi_run *run, int index, enum lumi_view_part part);
+/* What was read from `path` is a view's, pixel for pixel. */
+int lumi_run_check_view(const struct lumi_run *run, const struct lumi_raster *raster, const char *path,
+                        struct lumi_error *error);
 
 /* Which images a stage works on. All but the first want a placed run. */
 enum lumi_stage_set {

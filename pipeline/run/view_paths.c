@@ -29,6 +29,25 @@ void lumi_key_pose(struct lumi_key *key, const struct lumi_pose *pose)
     lumi_key_double(key, pose->t.z);
 }
 
+void lumi_key_grid(struct lumi_key *key, const struct lumi_grid *grid)
+{
+    lumi_key_int(key, grid->width);
+    lumi_key_int(key, grid->height);
+    for (int i = 0; i <= grid->cols; i++)
+        lumi_key_double(key, grid->tan_x[i]);
+    for (int i = 0; i <= grid->rows; i++)
+        lumi_key_double(key, grid->tan_y[i]);
+}
+
+int lumi_run_check_view(const struct lumi_run *run, const struct lumi_raster *raster, const char *path,
+                        struct lumi_error *error)
+{
+    if (raster->width == run->grid.width && raster->height == run->grid.height)
+        return LUMI_OK;
+    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d × %d pixels, the views are %d × %d", path, raster->width,
+                     raster->height, run->grid.width, run->grid.height);
+}
+
 char *lumi_run_image(const struct lumi_run *run, int index)
 {
     const struct lumi_source *source = &run->sources[index];

@@ -1,4 +1,5 @@
 /* The stage `synthesize`: which files go in and out; the most recent views are kept in memory. */
+#include "pipeline/run/recent.h"
 #include "pipeline/subsample/poles.h"
 #include "pipeline/synthesize/stand_mask.h"
 #include "pipeline/synthesize/synthesize.h"
@@ -21,8 +22,6 @@ enum {
 #define WIDE 0.6
 
 struct kept_view {
-    int index; /* −1: free */
-    long used;
     struct lumi_raster image, depth;
     uint8_t *blocked;
     long blocked_count;
@@ -32,7 +31,7 @@ struct synthesis {
     struct lumi_pose *poses; /* of the photographs */
     bool has_stand;
     struct lumi_stand stand;
-    long clock;
+    struct lumi_recent recent; /* which view stands where in `kept` */
     struct kept_view kept[KEPT];
 };
 
@@ -106,12 +105,7 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
     lumi_key_int(k, probe_count);
     for (int i = 0; i < probe_count; i++)
         key_photograph(k, run, probes[i]);
-    lumi_key_int(k, run->grid.width);
-    lumi_key_int(k, run->grid.height);
-    for (int i = 0; i <= run->grid.cols; i++)
-        lumi_key_double(k, run->grid.tan_x[i]);
-    for (int i = 0; i <= run->grid.rows; i++)
-        lumi_key_double(k, run->grid.tan_y[i]);
+    lumi_key_grid(k, &run->grid);
     return LUMI_OK;
 }
 
@@ -120,16 +114,7 @@ static void drop(struct kept_view *kept)
     lumi_raster_finish(&kept->image);
     lumi_raster_finish(&kept->depth);
     lumi_free(kept->blocked);
-    *kept = (struct kept_view){.index = -1};
-}
-
-static int check_size(const struct lumi_run *run, const struct lumi_raster *raster, const char *path,
-                      struct lumi_error *error)
-{
-    if (raster->width == run->grid.width && raster->height == run->grid.height)
-        return LUMI_OK;
-    return lumi_fail(error, LUMI_ERR_FORMAT, "%s: is %d×%d pixels, the views are %d×%d", path, raster->width,
-                     raster->height, run->grid.width, run->grid.height);
+    *kept = (struct kept_view){0};
 }
 
 static int read_depth(struct lumi_run *run, int index, struct lumi_raster *depth, struct lumi_error *error)
@@ -137,7 +122,7 @@ static int read_depth(struct lumi_run *run, int index, struct lumi_raster *depth
     g_autofree char *path = lumi_run_path(run, "depth", index, ".exr");
 
     LUMI_TRY(lumi_image_read_channel(path, "W", depth, error));
-    return check_size(run, depth, path, error);
+    return lumi_run_check_view(run, depth, path, error);
 }
 
 static int find_blocked(struct lumi_run *run, struct synthesis *state, int index, struct kept_view *kept,
@@ -165,14 +150,12 @@ static int read_view(struct lumi_run *run, struct synthesis *state, int index, s
     int code = lumi_image_read(path, 3, &kept->image, NULL, error);
 
     if (code == LUMI_OK)
-        code = check_size(run, &kept->image, path, error);
+        code = lumi_run_check_view(run, &kept->image, path, error);
     if (code == LUMI_OK)
         code = read_depth(run, index, &kept->depth, error);
     if (code == LUMI_OK)
         code = find_blocked(run, state, index, kept, error);
-    if (code == LUMI_OK)
-        kept->index = index;
-    else
+    if (code != LUMI_OK)
         drop(kept);
     return code;
 }
@@ -181,21 +164,14 @@ static int read_view(struct lumi_run *run, struct synthesis *state, int index, s
 static int view_of(struct lumi_run *run, struct synthesis *state, int index, const struct kept_view **view,
                    struct lumi_error *error)
 {
-    struct kept_view *oldest = &state->kept[0], *kept = NULL;
+    int slot;
 
-    for (int i = 0; i < KEPT && !kept; i++) {
-        if (state->kept[i].index == index)
-            kept = &state->kept[i];
-        if (state->kept[i].used < oldest->used)
-            oldest = &state->kept[i];
+    if (!lumi_recent_find(&state->recent, index, &slot)) {
+        drop(&state->kept[slot]);
+        LUMI_TRY(read_view(run, state, index, &state->kept[slot], error));
+        lumi_recent_take(&state->recent, slot, index);
     }
-    if (!kept) {
-        drop(oldest);
-        LUMI_TRY(read_view(run, state, index, oldest, error));
-        kept = oldest;
-    }
-    kept->used = ++state->clock;
-    *view = kept;
+    *view = &state->kept[slot];
     return LUMI_OK;
 }
 
@@ -245,8 +221,7 @@ static int begin(struct lumi_run *run, void **result, struct lumi_error *error)
     struct synthesis *state = g_new0(struct synthesis, 1);
 
     state->poses = photograph_poses(run);
-    for (int i = 0; i < KEPT; i++)
-        state->kept[i].index = -1;
+    lumi_recent_init(&state->recent, KEPT);
     const int code = find_stand(run, state, error);
     if (code != LUMI_OK) {
         end(run, state);
