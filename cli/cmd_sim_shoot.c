@@ -151,7 +151,7 @@ static int open_place(const char *name, const struct sim_rig *rig, struct sim_sc
 {
     if (tripod && rig->plane)
         return lumi_fail(error, LUMI_ERR_ARG, "--tripod: cameras on a sphere are wanted");
-    return tripod ? sim_place_open_stand(name, rig->radius, scene, error) : sim_place_open(name, scene, error);
+    return tripod ? sim_place_open_stand(name, rig->radius, true, scene, error) : sim_place_open(name, scene, error);
 }
 
 static int run(int argc, char **argv, struct lumi_error *error)

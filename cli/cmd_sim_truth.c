@@ -11,7 +11,7 @@
 static char *out, *rig_text, *from, *poses, *size_text, *format_text, *lens_text;
 #define NOT_GIVEN INT_MIN
 static int random_count = NOT_GIVEN, seed = 1, threads;
-static double fov, scale = 1, volume, eye_distance;
+static double fov, scale = 1, volume, eye_distance, shadow;
 static gboolean no_depth, inward;
 
 static const GOptionEntry options[] = {
@@ -37,6 +37,9 @@ static const GOptionEntry options[] = {
     {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &scale, "shrinks a rig's counts and resolution (1)", "S"},
     {"lens", 0, 0, G_OPTION_ARG_STRING, &lens_text, "pinhole, brown or fisheye, for planar and sphere", "LENS"},
     {"inward", 0, 0, G_OPTION_ARG_NONE, &inward, "a sphere's cameras look at its centre", NULL},
+    {"tripod-shadow", 0, 0, G_OPTION_ARG_DOUBLE, &shadow,
+     "with the shadow of the tripod that stands under cameras on a sphere of this radius, but without the tripod",
+     "METRES"},
     {"format", 0, 0, G_OPTION_ARG_STRING, &format_text, "png, jpeg or exr (linear light)", "FORMAT"},
     {"no-depth", 0, 0, G_OPTION_ARG_NONE, &no_depth, "no depth maps", NULL},
     {"threads", 'j', 0, G_OPTION_ARG_INT, &threads, "threads (all)", "N"},
@@ -115,6 +118,13 @@ static int choose_views(struct sim_rig *views, struct lumi_error *error)
     return code;
 }
 
+static int open_place(const char *name, struct sim_scene **scene, struct lumi_error *error)
+{
+    if (!(shadow >= 0 && shadow <= 10))
+        return lumi_fail(error, LUMI_ERR_ARG, "--tripod-shadow: a sphere's radius in metres is wanted, 10 at most");
+    return shadow > 0 ? sim_place_open_stand(name, shadow, false, scene, error) : sim_place_open(name, scene, error);
+}
+
 static int run(int argc, char **argv, struct lumi_error *error)
 {
     static const char *const formats[] = {"png", "jpeg", "exr", NULL};
@@ -138,7 +148,7 @@ static int run(int argc, char **argv, struct lumi_error *error)
     output.progress = progress;
     output.context = argv[0];
     LUMI_GOTO(code, done, choose_views(&views, error));
-    LUMI_GOTO(code, done, sim_place_open(argv[0], &scene, error));
+    LUMI_GOTO(code, done, open_place(argv[0], &scene, error));
     LUMI_GOTO(code, done, sim_truth_write(scene, &views, &output, out, error));
 done:
     sim_scene_destroy(scene);

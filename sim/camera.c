@@ -66,6 +66,19 @@ static void pixel_ray(const struct job *job, const struct corners *c, int i, int
     ray->spread = 0.70710678f * v3_length(diagonal);
 }
 
+/* The first thing along the ray that a camera sees. */
+static void look(const struct job *job, const struct sim_ray *ray, struct sim_hit *hit)
+{
+    float near = 1e-3f;
+
+    for (;;) {
+        sim_trace(job->scene, ray, near, hit);
+        if (hit->triangle < 0 || !job->scene->unseen || (size_t)hit->triangle < job->scene->unseen)
+            return;
+        near = hit->distance + 1e-4f;
+    }
+}
+
 struct range {
     struct sim_v3 sum, low, high;
 };
@@ -92,7 +105,7 @@ static struct range sample_pixel(const struct job *job, const struct corners *co
         int column = k % side, row = k / side;
         float a = (float)(column * side + row) + 0.5f, b = (float)(row * side + column) + 0.5f;
         pixel_ray(job, corners, i, j, tent(a / n), tent(b / n), &ray);
-        sim_trace(job->scene, &ray, 1e-3f, &hit);
+        look(job, &ray, &hit);
         int sun = side == FINE ? k * 7 % SIM_SUN_POINTS : rim[k];
         struct sim_v3 c = sim_shade(job->scene, &ray, &hit, sun);
         take(&range, c);
@@ -131,7 +144,7 @@ static float pixel_depth(const struct job *job, int x, int y)
     if (!lumi_lens_unproject(job->lens, x + 0.5, y + 0.5, &d))
         return 0;
     struct sim_ray ray = {.origin = v3_of(job->pose->t), .direction = v3_of(lumi_rotate(job->pose->r, d))};
-    sim_trace(job->scene, &ray, 1e-3f, &hit);
+    look(job, &ray, &hit);
     return hit.triangle < 0 ? INFINITY : hit.distance * (float)d.z;
 }
 

@@ -14,7 +14,9 @@ extern const struct sim_place *const sim_places[]; /* ends with NULL */
 
 /* Builds a place; release with sim_scene_destroy. LUMI_ERR_ARG lists the names when there is none of this one. */
 int sim_place_open(const char *name, struct sim_scene **scene, struct lumi_error *error);
-/* The same with a tripod under cameras on a sphere of this radius (sim/tripod.h). */
-int sim_place_open_stand(const char *name, double radius, struct sim_scene **scene, struct lumi_error *error);
+/* The same with a tripod under cameras on a sphere of this radius (sim/tripod.h); not `seen`: it casts its shadow, but
+ * no camera sees it itself, only reflections of it. */
+int sim_place_open_stand(const char *name, double radius, bool seen, struct sim_scene **scene,
+                         struct lumi_error *error);
 
 #endif

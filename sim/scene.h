@@ -65,7 +65,8 @@ struct sim_scene {
     struct sim_triangle *triangles;
     unsigned char *triangle_material;
     size_t vertex_count, vertex_room, triangle_count, triangle_room;
-    bool failed; /* memory could not be had: sim_scene_commit says so */
+    size_t unseen; /* triangles from here on take light, but no camera sees them; 0: there are none */
+    bool failed;   /* memory could not be had: sim_scene_commit says so */
 
     _Atomic(float) *light; /* three a vertex */
     atomic_uchar *lit;
