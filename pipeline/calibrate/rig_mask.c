@@ -44,7 +44,7 @@ static int sample_of(const struct lumi_run *run, int camera, int sample[SAMPLE])
 static bool wanted(const struct lumi_run *run, int index)
 {
     (void)index;
-    return run->rig && (run->wants.calibrate || run->wants.equalize);
+    return run->rig && (run->wants.calibrate || run->wants.equalize || run->wants.synthesize);
 }
 
 static int key(struct lumi_run *run, int index, struct lumi_key *key, struct lumi_error *error)

@@ -10,6 +10,7 @@ bool lumi_stand_place(struct lumi_vec3 centre, double sphere, double gap, double
         .centre = centre, .top = centre.z - sphere, .bottom = floor, .wide = radius > 0 ? radius : LUMI_STAND_RADIUS};
     /* Cameras go round it: what stands in the hole is narrower than that. */
     stand->narrow = fmin(0.9 * hole, stand->wide);
+    stand->head = fmin(fmax(stand->narrow, LUMI_STAND_HEAD), stand->wide);
     return hole > 0 && stand->bottom < stand->top;
 }
 

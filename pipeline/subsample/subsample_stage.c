@@ -1,4 +1,5 @@
 /* The stage `subsample`: flags and synthetic views over the frames that calibration left. */
+#include "pipeline/calibrate/rig_mask.h"
 #include "pipeline/geometry/disks.h"
 #include "pipeline/run/places.h"
 #include "pipeline/subsample/poles.h"
@@ -18,7 +19,8 @@ static bool wanted(const struct lumi_run *run, int index)
 static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
 {
     (void)index;
-    (void)error;
+    for (int i = 0; run->wants.synthesize && i < run->count; i++)
+        LUMI_TRY(lumi_rig_mask_key(k, run, i, error));
     lumi_key_int(k, run->wants.subsample);
     lumi_key_int(k, run->wants.synthesize);
     lumi_key_double(k, run->parameters.density);
@@ -133,6 +135,25 @@ static void mark_stand(const struct lumi_run *run, const struct layout *layout, 
     }
 }
 
+/* And who shows the rig itself. */
+static int mark_rig(const struct lumi_run *run, struct lumi_places *places, struct lumi_error *error)
+{
+    for (int i = 0; i < run->count; i++) {
+        const int at = lumi_places_find(places, run->sources[i].name);
+        struct lumi_raster mask;
+        bool rig = false;
+
+        if (at < 0 || !places->items[at].used)
+            continue;
+        LUMI_TRY(lumi_rig_mask_read(run, i, &mask, error));
+        for (int y = 0; mask.data && y < mask.height && !rig; y++)
+            rig = memchr(lumi_row_u8(&mask, y), 0, (size_t)mask.width) != NULL;
+        places->items[at].masked = places->items[at].masked || rig;
+        lumi_raster_finish(&mask);
+    }
+    return LUMI_OK;
+}
+
 static int make(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error)
 {
     struct lumi_places places;
@@ -149,7 +170,9 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
     code = LUMI_OK;
     if (run->wants.synthesize && layout.count > 0 && layout.surface == LUMI_SURFACE_SPHERE) {
         mark_stand(run, &layout, &places);
-        code = add_pole(run, &layout, false, &places, error);
+        code = mark_rig(run, &places, error);
+        if (code == LUMI_OK)
+            code = add_pole(run, &layout, false, &places, error);
         if (code == LUMI_OK)
             code = add_pole(run, &layout, true, &places, error);
     }
@@ -163,7 +186,7 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
 const struct lumi_stage lumi_stage_subsample = {
     .name = "subsample",
     .title = "choice of views",
-    .version = 1,
+    .version = 2,
     .extension = ".places",
     .whole = true,
     .set = LUMI_SET_FRAMES,

@@ -13,6 +13,7 @@ enum { FLOOR_WINDOW = 3, FLOOR_AROUND = 10 };
 
 /* Nearer than this nothing is matched: depth there is anything. */
 #define TOO_NEAR 0.3
+#define BELOW 0.15 /* of the height, which no depth is wrong by */
 
 void lumi_floor_init(struct lumi_floor *floor, double top)
 {
@@ -82,34 +83,56 @@ bool lumi_floor_find(const struct lumi_floor *floor, double *height)
     return true;
 }
 
+/* Whether a ray comes into the upright cylinder about the axis, from `bottom` to `top`, before depth could tell what is
+ * there. */
+static bool enters_near(const struct lumi_stand *stand, double radius, double top, struct lumi_vec3 eye,
+                        struct lumi_vec3 ray)
+{
+    const double x = eye.x - stand->centre.x, y = eye.y - stand->centre.y, length = lumi_length(ray);
+    const double a = ray.x * ray.x + ray.y * ray.y, b = x * ray.x + y * ray.y;
+    const double inside = b * b - a * (x * x + y * y - radius * radius), down = (top - eye.z) / ray.z;
+
+    if (eye.z > top && ray.z < 0 && down * length < TOO_NEAR && hypot(x + down * ray.x, y + down * ray.y) < radius)
+        return true;
+    if (b >= 0 || inside < 0)
+        return false;
+    const double t = (-b - sqrt(inside)) / a, z = eye.z + t * ray.z;
+    return t * length < TOO_NEAR && z < top && z > stand->bottom + FLOOR_MARGIN;
+}
+
+static bool enters_head(const struct lumi_stand *stand, struct lumi_vec3 eye, struct lumi_vec3 ray)
+{
+    return enters_near(stand, stand->head, stand->top - LUMI_STAND_CLEAR, eye, ray);
+}
+
+/* What such a ray shows lies farther below the floor than depth is wrong by. */
+static bool below_floor(const struct lumi_stand *stand, struct lumi_vec3 eye, struct lumi_vec3 point)
+{
+    return point.z < stand->bottom - BELOW * (eye.z - stand->bottom);
+}
+
 double lumi_stand_share(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
                         const struct lumi_raster *depth)
 {
     /* Nothing else comes as near to the axis as the cameras' circle: the upper half of the way is enough to tell. */
     const double low = (stand->top + stand->bottom) / 2;
-    long found = 0, all = 0;
+    long found = 0, all = 0, near = 0, below = 0;
 
     for (int y = 0; y < grid->height; y += 2)
         for (int x = 0; x < grid->width; x += 2, all++) {
             struct lumi_vec3 p;
-            if (point_at(grid, pose, depth, x, y, &p) && p.z > low && p.z < stand->centre.z &&
+            if (!point_at(grid, pose, depth, x, y, &p))
+                continue;
+            if (p.z > low && p.z < stand->centre.z &&
                 hypot(p.x - stand->centre.x, p.y - stand->centre.y) < stand->narrow)
                 found++;
+            else if (enters_head(stand, pose->t, lumi_sub(p, pose->t))) {
+                near++;
+                below += below_floor(stand, pose->t, p);
+            }
         }
-    return (double)found / (double)all;
-}
-
-/* Whether a ray comes into the hole that the cameras go round before depth could tell what is there. */
-static bool enters_near(const struct lumi_stand *stand, struct lumi_vec3 eye, struct lumi_vec3 ray)
-{
-    const double x = eye.x - stand->centre.x, y = eye.y - stand->centre.y;
-    const double a = ray.x * ray.x + ray.y * ray.y, b = x * ray.x + y * ray.y;
-    const double inside = b * b - a * (x * x + y * y - stand->narrow * stand->narrow);
-
-    if (b >= 0 || inside < 0)
-        return false;
-    const double t = (-b - sqrt(inside)) / a, z = eye.z + t * ray.z;
-    return t * lumi_length(ray) < TOO_NEAR && z < stand->centre.z && z > stand->bottom + FLOOR_MARGIN;
+    /* Nobody sees through the floor: there is something too near to be matched. */
+    return (double)(found + (3 * below > near ? below : 0)) / (double)all;
 }
 
 static bool blocks(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
@@ -121,7 +144,8 @@ static bool blocks(const struct lumi_stand *stand, const struct lumi_grid *grid,
     if (point_at(grid, pose, depth, x, y, &point) && lumi_stand_holds(stand, point, FLOOR_MARGIN))
         return true;
     lumi_grid_unproject(grid, x + 0.5, y + 0.5, &tan_x, &tan_y);
-    return enters_near(stand, pose->t, lumi_rotate(pose->r, lumi_vec3(tan_x, tan_y, 1)));
+    const struct lumi_vec3 ray = lumi_rotate(pose->r, lumi_vec3(tan_x, tan_y, 1));
+    return enters_near(stand, stand->narrow, stand->centre.z, pose->t, ray) || enters_head(stand, pose->t, ray);
 }
 
 long lumi_stand_mask(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,

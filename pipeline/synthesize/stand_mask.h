@@ -24,7 +24,8 @@ void lumi_floor_add(struct lumi_floor *floor, const struct lumi_grid *grid, cons
 bool lumi_floor_find(const struct lumi_floor *floor, double *height);
 
 /* Share of the view's pixels whose points are where only a stand can be: next to the axis, not wider than the hole
- * that the cameras go round, in the upper half of the way to the floor. */
+ * that the cameras go round, in the upper half of the way to the floor; or below the floor, where its head would be in
+ * between, too near to be matched. */
 double lumi_stand_share(const struct lumi_stand *stand, const struct lumi_grid *grid, const struct lumi_pose *pose,
                         const struct lumi_raster *depth);
 

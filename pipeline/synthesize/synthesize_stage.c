@@ -1,4 +1,5 @@
 /* The stage `synthesize`: which files go in and out; the most recent views are kept in memory. */
+#include "pipeline/calibrate/rig_mask.h"
 #include "pipeline/run/recent.h"
 #include "pipeline/subsample/poles.h"
 #include "pipeline/synthesize/stand_mask.h"
@@ -79,11 +80,13 @@ static int find_sources(const struct lumi_run *run, const struct lumi_pose *pose
     return lumi_synthesis_sources(run->dense, poses, &run->sources[index].pose, index, far, sources);
 }
 
-static void key_photograph(struct lumi_key *k, const struct lumi_run *run, int index)
+static int key_photograph(struct lumi_key *k, const struct lumi_run *run, int index, struct lumi_error *error)
 {
     lumi_key_pose(k, &run->sources[index].pose);
+    lumi_key_lens(k, &run->sources[index].lens);
     lumi_key_input(k, run, "equiangular", index);
     lumi_key_input(k, run, "depth", index);
+    return lumi_rig_mask_key(k, run, index, error);
 }
 
 static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_error *error)
@@ -92,19 +95,18 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
     int sources[LUMI_SYNTHESIS_SOURCES], probes[PROBES];
     const int probe_count = find_probes(run, poses, probes), count = find_sources(run, poses, index, sources);
 
-    (void)error;
     lumi_key_double(k, run->parameters.stand_m);
     lumi_key_double(k, run->radius);
     lumi_key_pose(k, &run->sources[index].pose);
     lumi_key_int(k, run->sources[index].synthetic);
     if (!run->sources[index].synthetic)
-        key_photograph(k, run, index);
+        LUMI_TRY(key_photograph(k, run, index, error));
     lumi_key_int(k, count);
     for (int i = 0; i < count; i++)
-        key_photograph(k, run, sources[i]);
+        LUMI_TRY(key_photograph(k, run, sources[i], error));
     lumi_key_int(k, probe_count);
     for (int i = 0; i < probe_count; i++)
-        key_photograph(k, run, probes[i]);
+        LUMI_TRY(key_photograph(k, run, probes[i], error));
     lumi_key_grid(k, &run->grid);
     return LUMI_OK;
 }
@@ -125,6 +127,25 @@ static int read_depth(struct lumi_run *run, int index, struct lumi_raster *depth
     return lumi_run_check_view(run, depth, path, error);
 }
 
+/* What the frame's mask says, in the view's pixels. */
+static int add_rig_mask(const struct lumi_run *run, int index, uint8_t *blocked, struct lumi_error *error)
+{
+    const struct lumi_grid *grid = &run->grid;
+    struct lumi_raster mask;
+
+    LUMI_TRY(lumi_rig_mask_read(run, index, &mask, error));
+    for (int y = 0; mask.data && y < grid->height; y++)
+        for (int x = 0; x < grid->width; x++) {
+            double tan_x, tan_y, px, py;
+            lumi_grid_unproject(grid, x + 0.5, y + 0.5, &tan_x, &tan_y);
+            if (lumi_lens_project(&run->sources[index].lens, lumi_vec3(tan_x, tan_y, 1), &px, &py) && px >= 0 &&
+                py >= 0 && px < mask.width && py < mask.height && !lumi_row_u8(&mask, (int)py)[(int)px])
+                blocked[(size_t)y * (size_t)grid->width + (size_t)x] = 1;
+        }
+    lumi_raster_finish(&mask);
+    return LUMI_OK;
+}
+
 static int find_blocked(struct lumi_run *run, struct synthesis *state, int index, struct kept_view *kept,
                         struct lumi_error *error)
 {
@@ -134,6 +155,7 @@ static int find_blocked(struct lumi_run *run, struct synthesis *state, int index
     kept->blocked = lumi_calloc(pixels, 1);
     if (!kept->blocked)
         return lumi_fail(error, LUMI_ERR_NOMEM, "no memory for the mask of %s", run->sources[index].name);
+    LUMI_TRY(add_rig_mask(run, index, kept->blocked, error));
     if (state->has_stand)
         lumi_stand_mask(&state->stand, grid, &run->sources[index].pose, &kept->depth, kept->blocked);
     if (lumi_mask_widen(kept->blocked, grid->width, grid->height, MAX(2, (grid->width + 80) / 160)) != LUMI_OK)
@@ -312,7 +334,7 @@ static int make(struct lumi_run *run, void *data, int index, int thread, const c
 const struct lumi_stage lumi_stage_synthesize = {
     .name = "synthesize",
     .title = "synthesis",
-    .version = 1,
+    .version = 2,
     .extension = ".exr",
     .set = LUMI_SET_FILLED,
     .wanted = wanted,

@@ -97,6 +97,29 @@ static void what_is_too_near_to_be_matched_is_blocked_whatever_its_depth(void **
     lumi_raster_finish(&scene.depth);
 }
 
+/* The head, 4 cm below the lowest cameras and wider than the circle they go round: its picture is matched to anything.
+ */
+static void what_seems_to_lie_below_the_floor_is_a_head_that_is_too_near(void **state)
+{
+    const int axis = HEIGHT / 2 * WIDTH + WIDTH / 2;
+    struct scene scene;
+    uint8_t blocked[WIDTH * HEIGHT] = {0};
+
+    (void)state;
+    look_down(&scene, 1e-6);
+    lumi_pose_look(lumi_vec3(0.059, 0, -0.294), lumi_vec3(0, 0, -1), lumi_vec3(1, 0, 0), &scene.pose);
+    assert_true(lumi_stand_place(lumi_vec3(0, 0, 0), 0.3, 0.2, 0.5, FLOOR, &scene.stand));
+    for (int i = 0; i < WIDTH * HEIGHT; i++)
+        lumi_row_f32(&scene.depth, i / WIDTH)[i % WIDTH] = (float)(1 / (-0.294 - FLOOR)); /* the floor */
+    assert_true(lumi_stand_share(&scene.stand, &scene.grid, &scene.pose, &scene.depth) == 0);
+    for (int i = 0; i < WIDTH * HEIGHT; i++)
+        lumi_row_f32(&scene.depth, i / WIDTH)[i % WIDTH] *= 0.5f;
+    assert_true(lumi_stand_share(&scene.stand, &scene.grid, &scene.pose, &scene.depth) > 0.1);
+    lumi_stand_mask(&scene.stand, &scene.grid, &scene.pose, &scene.depth, blocked);
+    assert_int_equal(blocked[axis], 1);
+    lumi_raster_finish(&scene.depth);
+}
+
 static void without_a_column_there_is_no_stand(void **state)
 {
     struct scene scene;
@@ -127,6 +150,7 @@ int main(void)
         cmocka_unit_test(the_floor_is_found_at_its_height),
         cmocka_unit_test(the_column_is_masked_and_the_floor_is_not),
         cmocka_unit_test(what_is_too_near_to_be_matched_is_blocked_whatever_its_depth),
+        cmocka_unit_test(what_seems_to_lie_below_the_floor_is_a_head_that_is_too_near),
         cmocka_unit_test(without_a_column_there_is_no_stand),
         cmocka_unit_test(a_mask_widens_by_so_many_pixels_to_all_sides),
     };
