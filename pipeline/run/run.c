@@ -164,6 +164,7 @@ int lumi_run_open(const char *capture, const char *work, const struct lumi_param
     run->parameters = *parameters;
     run->threads = threads;
     LUMI_GOTO(code, fail, lumi_sources_load(run, error));
+    LUMI_GOTO(code, fail, lumi_sources_mend(run, error));
     LUMI_GOTO(code, fail, lumi_file_check_output(run->work, run->capture, error));
     LUMI_GOTO(code, fail, lock_work(run, use, error));
     run->dense = run->count;
@@ -183,6 +184,7 @@ void lumi_run_close(struct lumi_run *run)
     for (int i = 0; i < run->count; i++)
         sources_free(&run->sources[i]);
     g_free(run->sources);
+    g_free(run->missing);
     g_free(run->kept);
     g_free(run->rig);
     if (run->priv->lock >= 0)

@@ -42,6 +42,8 @@ struct lumi_parameters {
     enum lumi_choice equalize;   /* auto: where it is calibrated */
     enum lumi_choice synthesize; /* auto: a rig that turns took it */
     enum lumi_choice subsample;  /* auto: as synthesize */
+    bool backwards;              /* the rig turned the other way than the capture says */
+    const char *exchange;        /* cameras that are in each other's place, "c02:c03,…"; NULL: none; the caller's */
     bool rolling_shutter;        /* the cameras read their rows one after the other while the rig turns */
     int prefilter;               /* samples a pixel, 0: none; −1: auto, as synthesize, the stage's own number */
     /* subsample, synthesize */
@@ -107,6 +109,15 @@ struct lumi_source {
     bool synthetic, masked, kept; /* as in struct lumi_place */
 };
 
+/* A picture that was planned and never came, or cannot be used, with nothing in its place. */
+struct lumi_missing {
+    char name[64], camera_name[64];
+    char why[160]; /* as the capture tells; "" */
+    int camera, position, turn;
+    double exposure_offset;
+    bool part; /* other shots of its bracket are there */
+};
+
 /* What is done, once parameters and capture are known. */
 struct lumi_wants {
     bool calibrate, equalize, synthesize, subsample, prefilter, color;
@@ -118,6 +129,8 @@ struct lumi_run {
     struct lumi_rig *rig; /* the capture's profile; NULL: none */
     struct lumi_source *sources;
     int count;
+    struct lumi_missing *missing; /* in the capture's order */
+    int missing_count;
     int dense; /* the first so many are photographs */
     int *kept; /* indices of those that become views of the field, ascending */
     int kept_count;

@@ -181,6 +181,64 @@ static int load_rig(struct lumi_run *run, struct lumi_capture *capture, struct l
     return code;
 }
 
+static bool is_usable(const struct lumi_capture_frame *frame)
+{
+    return frame->has_pose && frame->file[0] &&
+           (frame->state == LUMI_FRAME_RECEIVED || frame->state == LUMI_FRAME_ACCEPTED);
+}
+
+static char *place_of(const struct lumi_capture_frame *frame)
+{
+    return g_strdup_printf("%lld@%lld", (long long)frame->camera, (long long)frame->position_id);
+}
+
+static char *shot_of(const struct lumi_capture_frame *frame)
+{
+    g_autofree char *place = place_of(frame);
+
+    return g_strdup_printf("%s@%g", place, frame->exposure_offset);
+}
+
+static void add_missing(struct lumi_run *run, struct loading *loading, const struct lumi_capture_frame *frame,
+                        bool part)
+{
+    struct lumi_missing *missing = &run->missing[run->missing_count++];
+
+    *missing = (struct lumi_missing){.camera = number_in(loading->cameras, frame->camera),
+                                     .position = frame->position,
+                                     .turn = frame->turn,
+                                     .exposure_offset = frame->exposure_offset,
+                                     .part = part};
+    g_strlcpy(missing->name, frame->name, sizeof missing->name);
+    g_strlcpy(missing->camera_name, frame->camera_name, sizeof missing->camera_name);
+    g_strlcpy(missing->why, frame->reason, sizeof missing->why);
+}
+
+/* Frames that cannot be used and were not taken again. */
+static int load_missing(struct lumi_run *run, struct loading *loading, struct lumi_error *error)
+{
+    g_autoptr(GHashTable) there = g_hash_table_new_full(g_str_hash, g_str_equal, g_free, NULL);
+    struct lumi_capture_frame *frames = NULL;
+    int count = 0;
+
+    LUMI_TRY(lumi_capture_frames(loading->capture, LUMI_FRAMES_ALL, &frames, &count, error));
+    run->missing = g_new0(struct lumi_missing, (gsize)count + 1);
+    for (int i = 0; i < count; i++)
+        if (is_usable(&frames[i])) {
+            g_hash_table_add(there, place_of(&frames[i]));
+            g_hash_table_add(there, shot_of(&frames[i]));
+        }
+    for (int i = 0; i < count; i++) {
+        g_autofree char *place = place_of(&frames[i]), *shot = shot_of(&frames[i]);
+        if (g_hash_table_contains(there, shot))
+            continue;
+        add_missing(run, loading, &frames[i], g_hash_table_contains(there, place));
+        g_hash_table_add(there, g_steal_pointer(&shot));
+    }
+    lumi_free(frames);
+    return LUMI_OK;
+}
+
 static int load_frames(struct lumi_run *run, struct loading *loading, struct lumi_error *error)
 {
     struct lumi_capture_frame *frames = NULL;
@@ -235,6 +293,7 @@ int lumi_sources_load(struct lumi_run *run, struct lumi_error *error)
     load_cameras(&loading);
     LUMI_GOTO(code, out, load_rig(run, loading.capture, error));
     LUMI_GOTO(code, out, load_frames(run, &loading, error));
+    LUMI_GOTO(code, out, load_missing(run, &loading, error));
     code = load_white(run, loading.capture, error);
 out:
     lumi_capture_close(loading.capture);
