@@ -69,6 +69,10 @@ static int read_pairs(const struct lumi_run *run, int index, GHashTable *names, 
         frames[other].partners += pair->match_count > 0;
         frames[index].matches += pair->match_count;
         frames[other].matches += pair->match_count;
+        if (run->sources[index].camera != run->sources[other].camera) {
+            frames[index].foreign += pair->match_count;
+            frames[other].foreign += pair->match_count;
+        }
         take_motion(motions, index, other, pair);
     }
     lumi_pairs_finish(&list);
@@ -142,6 +146,10 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
                                            true};
     code = lumi_calibrate(run, &evidence, &tracks, &c, error);
     lumi_tracks_finish(&tracks);
+    if (code == LUMI_ERR_FORMAT && error) {
+        g_autofree char *refused = g_strdup_printf("not calibrated\n\n" TO_LOOK_AT "\n  %s.\n", error->text);
+        write_report(run, "report.txt", refused, NULL);
+    }
     if (code != LUMI_OK)
         return code;
     g_autofree char *text = lumi_calibration_text(run, &c), *json = lumi_calibration_json(run, &c);
@@ -154,20 +162,42 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
     return code;
 }
 
-char *lumi_calibrate_line(const struct lumi_run *run)
+static char *read_report(const struct lumi_run *run)
 {
     g_autofree char *path = g_build_filename(run->work, lumi_stage_calibrate.name, "report.txt", NULL);
     char *text = NULL;
 
-    if (!run->wants.calibrate || !g_file_get_contents(path, &text, NULL, NULL))
-        return NULL;
-    text[strcspn(text, "\n")] = 0;
+    return run->wants.calibrate && g_file_get_contents(path, &text, NULL, NULL) ? text : NULL;
+}
+
+char *lumi_calibrate_line(const struct lumi_run *run)
+{
+    char *text = read_report(run);
+
+    if (text)
+        text[strcspn(text, "\n")] = 0;
     return text;
+}
+
+char *lumi_calibrate_remarks(const struct lumi_run *run)
+{
+    g_autofree char *text = read_report(run);
+    GString *remarks = g_string_new(NULL);
+    const char *at = text ? strstr(text, "\n" TO_LOOK_AT "\n") : NULL;
+
+    /* The lines of that section are indented; an empty one ends it. */
+    for (at = at ? at + strlen("\n" TO_LOOK_AT "\n") : NULL; at && g_str_has_prefix(at, "  ");) {
+        const size_t length = strcspn(at, "\n");
+        g_string_append_len(remarks, at + 2, (gssize)length - 2);
+        g_string_append_c(remarks, '\n');
+        at += length + (at[length] == '\n');
+    }
+    return g_string_free(remarks, FALSE);
 }
 
 const struct lumi_stage lumi_stage_calibrate = {.name = "calibrate",
                                                 .title = "calibrating",
-                                                .version = 6,
+                                                .version = 7,
                                                 .extension = ".places",
                                                 .whole = true,
                                                 .set = LUMI_SET_FRAMES,

@@ -15,6 +15,7 @@ struct lumi_frame_evidence {
     double mean, sharpness; /* as in struct lumi_features */
     int partners;           /* that share matches with it */
     int matches;            /* with all of them */
+    int foreign;            /* of these, with pictures of other cameras */
 };
 
 /* What two pictures say of one another by themselves, as in struct lumi_pair. */
@@ -88,13 +89,18 @@ void lumi_calibration_find(struct lumi_calibration *calibration, int frames_lost
 void lumi_calibration_drop(struct lumi_calibration *calibration, int frame, const char *format, ...)
     G_GNUC_PRINTF(3, 4);
 
-/* What is wrong before anything is solved: black and blurred pictures, missing rows, frames without neighbours, cameras
- * whose prior is another's, a sweep that turned the other way. Drops, and finds. */
+/* What is wrong before anything is solved: pictures that are missing, black or blurred, short brackets, cameras and
+ * frames that share nothing with others, cameras whose prior is another's, a sweep that turned the other way. Drops,
+ * and finds. */
 int lumi_calibration_suspects(const struct lumi_run *run, const struct lumi_evidence *evidence,
                               struct lumi_calibration *calibration, struct lumi_error *error);
-/* Cameras whose prior their own pictures contradict; part of the above. */
+/* Its parts: what never came; cameras whose prior their own pictures contradict. */
+void lumi_calibration_missing(const struct lumi_run *run, struct lumi_calibration *calibration);
 int lumi_calibration_wrong_priors(const struct lumi_run *run, const struct lumi_evidence *evidence,
                                   struct lumi_calibration *calibration, struct lumi_error *error);
+
+/* The heading above the findings in the report, one to an indented line. */
+#define TO_LOOK_AT "To look at"
 
 /* The report, for a person and as one JSON object; free with g_free. And in a line. */
 char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibration *calibration);

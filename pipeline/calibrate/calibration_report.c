@@ -178,7 +178,7 @@ char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibr
                                "had them (median)\n",
                                c->refined.matched, c->refined.moved);
     if (c->findings->len)
-        g_string_append(text, "\nTo look at\n");
+        g_string_append(text, "\n" TO_LOOK_AT "\n");
     for (guint i = 0; i < c->findings->len; i++) {
         const struct lumi_finding *f = &g_array_index(c->findings, struct lumi_finding, i);
         g_string_append_printf(text, "  %s %s.\n", f->what, f->text);

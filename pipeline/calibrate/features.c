@@ -203,7 +203,7 @@ done:
 const struct lumi_stage lumi_stage_features = {
     .name = "features",
     .title = "finding features",
-    .version = 1,
+    .version = 2,
     .extension = ".feat",
     .set = LUMI_SET_FRAMES,
     .wanted = wanted,

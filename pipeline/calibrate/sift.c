@@ -173,21 +173,29 @@ static int describe_octave(struct lumi_sift *sift, int candidates, int room, str
     return count;
 }
 
-/* The root mean square of the first difference of blurs in the octave the filter is at. */
-static double band(const VlSiftFilt *filter)
+/* The root mean square of the first difference of blurs in the octave the filter is at (not a doubled one), of what is
+ * used: the outline of the rest is sharp in any picture. */
+static double band(const VlSiftFilt *filter, const uint8_t *use, int full_width)
 {
-    const size_t count = (size_t)vl_sift_get_octave_width(filter) * (size_t)vl_sift_get_octave_height(filter);
+    const int width = vl_sift_get_octave_width(filter), height = vl_sift_get_octave_height(filter);
+    const int octave = vl_sift_get_octave_index(filter);
     const float *fine = vl_sift_get_octave(filter, 0), *coarse = vl_sift_get_octave(filter, 1);
     double sum = 0;
+    long count = 0;
 
-    for (size_t i = 0; i < count; i++) {
-        const double difference = (double)coarse[i] - (double)fine[i];
-        sum += difference * difference;
-    }
-    return sqrt(sum / (double)count);
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            const size_t at = (size_t)y * (size_t)width + (size_t)x;
+            if (use && !use[(size_t)(y << octave) * (size_t)full_width + (size_t)(x << octave)])
+                continue;
+            const double difference = (double)coarse[at] - (double)fine[at];
+            sum += difference * difference;
+            count++;
+        }
+    return count ? sqrt(sum / (double)count) : 0;
 }
 
-static int find(struct lumi_sift *sift, const float *grey, const struct lumi_sift_settings *settings,
+static int find(struct lumi_sift *sift, const float *grey, int width, const struct lumi_sift_settings *settings,
                 struct lumi_feature *items, int *count, double bands[2])
 {
     VlSiftFilt *filter = sift->filter;
@@ -198,7 +206,7 @@ static int find(struct lumi_sift *sift, const float *grey, const struct lumi_sif
         const int octave = vl_sift_get_octave_index(filter), left = settings->most - *count;
         const bool last = octave == vl_sift_get_octave_first(filter) + vl_sift_get_noctaves(filter) - 1;
         if (octave == 0 || octave == 1)
-            bands[octave] = band(filter);
+            bands[octave] = band(filter, settings->use, width);
         vl_sift_detect(filter);
         const int candidates = collect(sift, settings);
         if (candidates < 0)
@@ -222,7 +230,7 @@ int lumi_sift_find(struct lumi_sift *sift, const float *grey, int width, int hei
     struct lumi_feature *found = lumi_calloc((size_t)settings->most, sizeof *found);
     int code = found ? prepare(sift, width, height, settings) : LUMI_ERR_NOMEM;
     if (code == LUMI_OK)
-        code = find(sift, grey, settings, found, count, bands);
+        code = find(sift, grey, width, settings, found, count, bands);
     if (code != LUMI_OK) {
         lumi_free(found);
         *count = 0;

@@ -7,8 +7,9 @@
 
 #define BLACK 0.02        /* of full brightness: less is a lens cap, or a shutter that did not open */
 #define FEW_FEATURES 20   /* in a picture that is not black */
-#define BLURRED 0.5       /* of the sharpness of the other cameras */
+#define BLURRED 0.55      /* of the sharpness of the other cameras; one that sees clouds alone has 0.66 */
 #define FEWEST_MATCHES 15 /* with all neighbours together */
+#define FREELY_FOUND 20   /* matches that two pictures have in common by more than chance */
 
 static double median_of(GArray *values)
 {
@@ -79,23 +80,70 @@ static void find_blurred(const struct lumi_run *run, const struct lumi_evidence 
     }
 }
 
-static void find_missing_rows(const struct lumi_run *run, struct lumi_calibration *c)
+/* Matches a picture of a camera's with pictures of other cameras; of those that are used. */
+static double camera_overlap(const struct lumi_run *run, const struct lumi_evidence *e,
+                             const struct lumi_calibration *c, int camera)
 {
-    if (!run->rig)
-        return;
-    for (int camera = 0; camera < run->rig->camera_count; camera++)
-        for (int turn = 0; turn < run->rig->turns; turn++) {
-            int there = 0;
-            for (int i = 0; i < run->count; i++)
-                there += run->sources[i].turn == turn && lumi_calibration_rig_camera(run, i) == camera;
-            if (there == run->rig->positions || (there > 0 && there > run->rig->positions / 2))
-                continue;
-            g_autofree char *what = g_strdup_printf("camera %s", run->rig->cameras[camera].name);
-            lumi_calibration_find(c, 0, what,
-                                  "has %d of %d pictures in turn %d%s; the light field is thin there. Take the row "
-                                  "again, or import it if it was forgotten",
-                                  there, run->rig->positions, turn, there ? "" : ": a missing row");
+    int matches = 0, pictures = 0;
+
+    for (int i = 0; i < run->count; i++)
+        if (run->sources[i].camera == camera && c->frames[i].used) {
+            matches += e->frames[i].foreign;
+            pictures++;
         }
+    return pictures ? (double)matches / pictures : -1;
+}
+
+/* Whether its pictures, matched without their prior, show what other cameras show. */
+static bool seen_by_others(const struct lumi_run *run, const struct lumi_evidence *e, int camera)
+{
+    int tried = 0, found = 0;
+
+    for (int i = 0; i < e->motion_count; i++) {
+        const struct lumi_motion *m = &e->motions[i];
+        int a = run->sources[m->a].camera, b = run->sources[m->b].camera;
+        if (a == b || (a != camera && b != camera))
+            continue;
+        tried++;
+        found += m->free_count >= FREELY_FOUND;
+    }
+    return found > 0 && found >= MIN(tried / 4, 3);
+}
+
+static void find_isolated(const struct lumi_run *run, const struct lumi_evidence *e, struct lumi_calibration *c)
+{
+    g_autoptr(GArray) all = g_array_new(FALSE, FALSE, sizeof(double));
+    int cameras = 0;
+
+    for (int i = 0; i < run->count; i++)
+        cameras = MAX(cameras, run->sources[i].camera + 1);
+    for (int camera = 0; camera < cameras; camera++) {
+        double overlap = camera_overlap(run, e, c, camera);
+        if (overlap >= 0)
+            g_array_append_val(all, overlap);
+    }
+    const double usual = median_of(all);
+    if (all->len < 3 || usual < 2 * FEWEST_MATCHES)
+        return;
+    for (int camera = 0; camera < cameras; camera++) {
+        const double overlap = camera_overlap(run, e, c, camera);
+        int lost = 0, first = -1;
+        if (overlap < 0 || overlap >= FEWEST_MATCHES || seen_by_others(run, e, camera))
+            continue;
+        for (int i = 0; i < run->count; i++)
+            if (run->sources[i].camera == camera) {
+                first = first < 0 ? i : first;
+                lost += c->frames[i].used;
+                lumi_calibration_drop(c, i, "its camera shares nothing with the others");
+            }
+        g_autofree char *what = g_strdup_printf("camera %s", run->sources[first].camera_name);
+        lumi_calibration_find(
+            c, lost, what,
+            "shares nothing with the other cameras (%.0f points a picture, the others %.0f): its "
+            "pictures are not used. Are they of this place, upright, not mirrored, in focus, and does "
+            "it look where its neighbours look? Turn it towards them, and take them again",
+            overlap, usual);
+    }
 }
 
 static void find_alone(const struct lumi_run *run, const struct lumi_evidence *e, struct lumi_calibration *c)
@@ -108,9 +156,10 @@ static void find_alone(const struct lumi_run *run, const struct lumi_evidence *e
 int lumi_calibration_suspects(const struct lumi_run *run, const struct lumi_evidence *e, struct lumi_calibration *c,
                               struct lumi_error *error)
 {
-    find_missing_rows(run, c);
+    lumi_calibration_missing(run, c);
     find_black(run, e, c);
     find_blurred(run, e, c);
+    find_isolated(run, e, c);
     LUMI_TRY(lumi_calibration_wrong_priors(run, e, c, error));
     find_alone(run, e, c);
     return LUMI_OK;

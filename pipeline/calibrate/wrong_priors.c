@@ -7,10 +7,11 @@
 #include <string.h>
 
 #define DEGREE (LUMI_PI / 180)
-#define LIKELY 0.7     /* share of motions that agree with a hypothesis which is taken */
-#define UNLIKELY 0.5   /* and at most with the capture as it is */
-#define OUTSIDE 0.5    /* share of a pair's matches beyond the prior's band that contradicts the prior */
-#define FEWEST 6       /* motions that anything is concluded from */
+#define LIKELY 0.5   /* share of motions that agree with a hypothesis which is taken: by chance none do, and what */
+#define BETTER 0.25  /* repeats itself in the place agrees with nothing; and so much less with the capture as it is, */
+#define UNLIKELY 0.5 /* at most this */
+#define OUTSIDE 0.5  /* share of a pair's matches beyond the prior's band that contradicts the prior */
+#define FEWEST 6     /* motions that anything is concluded from */
 #define FREE_FEWEST 12 /* matches that a motion is believed from */
 
 /* What may have happened to the capture. */
@@ -39,12 +40,31 @@ static bool known(const struct lumi_motion *m)
            m->rotation[0] * m->rotation[0] + m->rotation[4] * m->rotation[4] + m->rotation[8] * m->rotation[8] > 0;
 }
 
+/* How far a rotation may be beside what a hypothesis has. */
+static double tolerance(const struct lumi_run *run)
+{
+    return fmax(4 * DEGREE, 5 * (run->rig ? run->rig->uncertainty.rotation : 0.5 * DEGREE));
+}
+
+/* Whether a motion can tell the hypothesis from the capture as it is: otherwise it agrees with both. */
+static bool tells(const struct lumi_run *run, const struct hypothesis *h, const struct lumi_motion *m)
+{
+    struct lumi_pose a, b;
+    double under[9], given[9];
+
+    pose_under(run, h, m->a, &a);
+    pose_under(run, h, m->b, &b);
+    lumi_rotation_between(a.r, b.r, under);
+    lumi_rotation_between(run->sources[m->a].prior.r, run->sources[m->b].prior.r, given);
+    return lumi_rotation_angle(under, given) > tolerance(run);
+}
+
 /* Whether the pictures moved as the hypothesis has it. Of the capture as it is the matches themselves say so: a motion
  * found from them alone has two answers where all that is seen lies in one plane, and the wrong one may be taken. */
 static bool agrees(const struct lumi_run *run, const struct hypothesis *h, const struct lumi_motion *m)
 {
     const struct lumi_rig_uncertainty *u = run->rig ? &run->rig->uncertainty : NULL;
-    double sigma = u ? u->rotation : 0.5 * DEGREE, place = u ? u->position_m : 0.005;
+    double place = u ? u->position_m : 0.005;
     struct lumi_pose a, b;
     double between[9];
 
@@ -53,7 +73,7 @@ static bool agrees(const struct lumi_run *run, const struct hypothesis *h, const
     pose_under(run, h, m->a, &a);
     pose_under(run, h, m->b, &b);
     lumi_rotation_between(a.r, b.r, between);
-    if (lumi_rotation_angle(between, m->rotation) > fmax(4 * DEGREE, 5 * sigma))
+    if (lumi_rotation_angle(between, m->rotation) > tolerance(run))
         return false;
     struct lumi_vec3 moved = lumi_rotate_back(a.r, lumi_sub(b.t, a.t));
     double length = lumi_length(moved);
@@ -62,9 +82,10 @@ static bool agrees(const struct lumi_run *run, const struct hypothesis *h, const
     return lumi_dot(moved, m->direction) > 0.7 * length;
 }
 
-/* Share of the motions that agree, of those that a camera takes part in (−1: of all; of two: of either). */
-static double share(const struct lumi_run *run, const struct lumi_evidence *e, const struct hypothesis *h, int first,
-                    int second, int *count)
+/* Share of the motions of used pictures that agree, of those that a camera takes part in (−1: of all; of two: of
+ * either). */
+static double share(const struct lumi_run *run, const struct lumi_evidence *e, const struct lumi_calibration *c,
+                    const struct hypothesis *h, const struct hypothesis *alternative, int first, int second, int *count)
 {
     int agreed = 0;
 
@@ -72,7 +93,11 @@ static double share(const struct lumi_run *run, const struct lumi_evidence *e, c
     for (int i = 0; i < e->motion_count; i++) {
         const struct lumi_motion *m = &e->motions[i];
         int a = lumi_calibration_rig_camera(run, m->a), b = lumi_calibration_rig_camera(run, m->b);
-        if (!known(m) || (first >= 0 && a != first && b != first && a != second && b != second))
+        if (!known(m) || !c->frames[m->a].used || !c->frames[m->b].used)
+            continue;
+        if (first >= 0 && a != first && b != first && a != second && b != second)
+            continue;
+        if (alternative && !tells(run, alternative, m))
             continue;
         (*count)++;
         agreed += agrees(run, h, m);
@@ -93,7 +118,8 @@ static int drop_camera(const struct lumi_run *run, struct lumi_calibration *c, i
 }
 
 /* The camera that this one is exchanged with, if both say so. */
-static int find_swap(const struct lumi_run *run, const struct lumi_evidence *e, int camera, double *agreed)
+static int find_swap(const struct lumi_run *run, const struct lumi_evidence *e, const struct lumi_calibration *c,
+                     int camera, double *agreed)
 {
     int best = -1, count;
 
@@ -102,9 +128,9 @@ static int find_swap(const struct lumi_run *run, const struct lumi_evidence *e, 
         const struct hypothesis swapped = {camera, other, false}, given = {-1, -1, false};
         if (other == camera)
             continue;
-        double was = share(run, e, &given, camera, other, &count);
-        double is = share(run, e, &swapped, camera, other, &count);
-        if (count >= FEWEST && is > LIKELY && is > was + 0.25 && is > *agreed) {
+        double was = share(run, e, c, &given, &swapped, camera, other, &count);
+        double is = share(run, e, c, &swapped, &swapped, camera, other, &count);
+        if (count >= FEWEST && is > LIKELY && is > was + BETTER && is > *agreed) {
             *agreed = is;
             best = other;
         }
@@ -120,10 +146,10 @@ static void find_wrong_cameras(const struct lumi_run *run, const struct lumi_evi
 
     for (int camera = 0; camera < run->rig->camera_count; camera++) {
         int count;
-        double agreed, was = share(run, e, &given, camera, camera, &count);
+        double agreed, was = share(run, e, c, &given, NULL, camera, camera, &count);
         if (named[camera] || count < FEWEST || was > UNLIKELY || overall < was + 0.1)
             continue;
-        int other = find_swap(run, e, camera, &agreed);
+        int other = find_swap(run, e, c, camera, &agreed);
         const char *name = run->rig->cameras[camera].name;
         g_autofree char *what = g_strdup_printf("camera %s", name);
         if (other >= 0) {
@@ -132,9 +158,9 @@ static void find_wrong_cameras(const struct lumi_run *run, const struct lumi_evi
             int lost = drop_camera(run, c, camera, why) + drop_camera(run, c, other, why);
             lumi_calibration_find(c, lost, what,
                                   "and camera %s are in each other's place: %.0f %% of what their pictures say agrees "
-                                  "with that, %.0f %% with the capture as it is. They are not used; exchange their "
-                                  "names in the rig profile, or their folders, and import again",
-                                  second, 100 * agreed, 100 * was);
+                                  "with that, %.0f %% with the capture as it is. They are not used; with --exchange "
+                                  "%s:%s they are (or import again with their folders exchanged)",
+                                  second, 100 * agreed, 100 * was, name, second);
             named[other] = true;
             continue;
         }
@@ -154,16 +180,18 @@ int lumi_calibration_wrong_priors(const struct lumi_run *run, const struct lumi_
 
     if (!run->rig)
         return LUMI_OK;
-    double was = share(run, e, &given, -1, -1, &count);
+    const double overall = share(run, e, c, &given, NULL, -1, -1, &count);
     if (count < FEWEST)
         return LUMI_OK;
-    double is = share(run, e, &backwards, -1, -1, &count);
-    if (is > LIKELY && was < UNLIKELY)
-        return lumi_fail(error, LUMI_ERR_FORMAT,
-                         "%s: the rig turned the other way than its profile says: %.0f %% of what the pictures say "
-                         "agrees with that, %.0f %% with the capture as it is; set direction = %d in the profile and "
-                         "import again",
-                         run->capture, 100 * is, 100 * was, -run->rig->direction);
-    find_wrong_cameras(run, e, c, was);
+    const double was = share(run, e, c, &given, &backwards, -1, -1, &count);
+    const double is = share(run, e, c, &backwards, &backwards, -1, -1, &count);
+    if (count >= FEWEST && is > LIKELY && is > was + BETTER && was < UNLIKELY)
+        return lumi_fail(
+            error, LUMI_ERR_FORMAT,
+            "%s: the rig turned the other way than its profile says: %.0f %% of what the pictures say "
+            "agrees with that, %.0f %% with the capture as it is; run it with --backwards (or import again "
+            "with direction = %d in the profile)",
+            run->capture, 100 * is, 100 * was, -run->rig->direction);
+    find_wrong_cameras(run, e, c, overall);
     return LUMI_OK;
 }

@@ -82,6 +82,7 @@ static void make_world(struct world *w, double noise)
         const struct lumi_bundle_observation *o = &s->bundle.observations[i];
         w->tracks.observations[i] = (struct lumi_observation){o->camera, 0, (float)o->x, (float)o->y, (float)o->sigma};
         w->evidence.frames[o->camera].matches++;
+        w->evidence.frames[o->camera].foreign++;
     }
     for (int i = 0; i < w->run.count; i++) {
         w->evidence.frames[i].features = 500;
@@ -202,6 +203,8 @@ static void two_cameras_in_each_others_place_are_named_and_the_rest_is_calibrate
     g_autofree char *first = g_strdup_printf("camera %s", w.rig.cameras[1].name);
     assert_true(finds(&c, first, w.rig.cameras[4].name));
     assert_true(finds(&c, first, "in each other's place"));
+    g_autofree char *advice = g_strdup_printf("--exchange %s:%s", w.rig.cameras[1].name, w.rig.cameras[4].name);
+    assert_true(finds(&c, first, advice));
     for (int i = 0; i < w.run.count; i++)
         assert_int_equal(c.frames[i].used, w.run.sources[i].camera != 1 && w.run.sources[i].camera != 4);
     poses_are_right(&w, &c);
@@ -228,6 +231,7 @@ static void a_rig_that_turned_the_other_way_is_said_to_have(void **state)
     assert_non_null(strstr(error.text, "turned the other way"));
     g_autofree char *advice = g_strdup_printf("direction = %d", -w.rig.direction);
     assert_non_null(strstr(error.text, advice));
+    assert_non_null(strstr(error.text, "--backwards"));
     finish_world(&w);
 }
 
@@ -248,7 +252,7 @@ static void a_missing_row_and_a_camera_without_neighbours_are_named(void **state
     }
     for (int i = 0; i < w.run.count; i++)
         if (w.run.sources[i].camera == 5)
-            w.evidence.frames[i].matches = 3;
+            w.evidence.frames[i].matches = w.evidence.frames[i].foreign = 3;
     for (int i = 0; i < w.evidence.motion_count; i++)
         if (w.run.sources[w.evidence.motions[i].a].camera == 5 || w.run.sources[w.evidence.motions[i].b].camera == 5)
             w.evidence.motions[i].free_count = 0;
@@ -259,11 +263,39 @@ static void a_missing_row_and_a_camera_without_neighbours_are_named(void **state
     calibrate(&w, &c);
     g_autofree char *alone = g_strdup_printf("camera %s", w.rig.cameras[5].name);
     g_autofree char *missing = g_strdup_printf("camera %s", w.rig.cameras[0].name);
-    assert_true(finds(&c, alone, "too little in common"));
+    assert_true(finds(&c, alone, "shares nothing with the other cameras"));
+    assert_false(finds(&c, alone, "is not where the rig profile has it"));
     assert_true(finds(&c, missing, "missing row"));
     for (int i = 0; i < w.run.count; i++)
         assert_int_equal(c.frames[i].used, w.run.sources[i].camera != 5);
     poses_are_right(&w, &c);
+    lumi_calibration_finish(&c);
+    finish_world(&w);
+}
+
+static void pictures_that_never_came_and_short_brackets_are_named(void **state)
+{
+    struct lumi_source_part parts[2] = {{.exposure_offset = -2}, {.exposure_offset = 0}};
+    struct lumi_missing missing[2] = {{.why = "the video lacks it", .camera = 3, .position = 7},
+                                      {.camera = 3, .position = 9}};
+    struct lumi_calibration c;
+    struct world w;
+
+    (void)state;
+    make_world(&w, 0.3);
+    for (int k = 0; k < 2; k++)
+        g_strlcpy(missing[k].camera_name, w.rig.cameras[3].name, sizeof missing[k].camera_name);
+    w.run.missing = missing;
+    w.run.missing_count = 2;
+    for (int i = 0; i < w.run.count; i++) {
+        w.run.sources[i].parts = parts;
+        w.run.sources[i].part_count = i % 5 == 4 ? 1 : 2;
+    }
+    calibrate(&w, &c);
+    g_autofree char *camera = g_strdup_printf("camera %s", w.rig.cameras[3].name);
+    assert_true(finds(&c, camera, "lacks 2 of 20 pictures in turn 0 (positions 7, 9): the video lacks it"));
+    assert_true(finds(&c, "brackets", "21 of 108 pictures lack a shot (f004 that of +0 stops)"));
+    assert_int_equal(c.used, w.run.count);
     lumi_calibration_finish(&c);
     finish_world(&w);
 }
@@ -350,6 +382,7 @@ int main(void)
         cmocka_unit_test(two_cameras_in_each_others_place_are_named_and_the_rest_is_calibrated),
         cmocka_unit_test(a_rig_that_turned_the_other_way_is_said_to_have),
         cmocka_unit_test(a_missing_row_and_a_camera_without_neighbours_are_named),
+        cmocka_unit_test(pictures_that_never_came_and_short_brackets_are_named),
         cmocka_unit_test(a_lens_that_does_not_fit_is_found_from_the_capture_and_said_to_be),
         cmocka_unit_test(the_same_input_gives_the_same_bytes),
         cmocka_unit_test(the_report_says_how_good_it_is_and_what_to_look_at),

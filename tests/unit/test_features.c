@@ -217,6 +217,36 @@ static void a_blurred_picture_is_less_sharp_whatever_its_light(void **unused)
     lumi_free(blurred);
 }
 
+static void the_outline_of_a_mask_makes_no_picture_sharp(void **unused)
+{
+    struct lumi_sift_settings settings;
+    struct lumi_feature *items;
+    float *grey = lumi_calloc(SIDE * SIDE, sizeof *grey), sharpness[2];
+    uint8_t *use = lumi_calloc(SIDE * SIDE, 1);
+    struct lumi_sift *sift = lumi_sift_create();
+    int count;
+
+    (void)unused;
+    lumi_sift_defaults(&settings);
+    /* Soft waves; what is not used is black, with a sharp edge. */
+    for (int masked = 0; masked < 2; masked++) {
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            const int x = i % SIDE, y = i / SIDE;
+            const float wave = 120 + 60 * sinf((float)x / 8) * cosf((float)y / 9);
+            use[i] = !masked || (x > SIDE / 4 + 8);
+            grey[i] = masked && x < SIDE / 4 ? 0 : wave;
+        }
+        settings.use = use;
+        assert_int_equal(lumi_sift_find(sift, grey, SIDE, SIDE, &settings, &items, &count, &sharpness[masked], NULL),
+                         LUMI_OK);
+        lumi_free(items);
+    }
+    assert_true(fabsf(sharpness[1] - sharpness[0]) < 0.1f * sharpness[0]);
+    lumi_sift_destroy(sift);
+    lumi_free(grey);
+    lumi_free(use);
+}
+
 static void a_file_gives_back_what_was_written_and_is_refused_when_it_is_damaged(void **unused)
 {
     struct lumi_feature items[3] = {{1.25f, 2.5f, 1.6f, -3, {1, 2, 3}}, {99.5f, 0, 20, 6, {255}}, {3, 4, 5, 0, {0}}};
@@ -255,6 +285,7 @@ int main(void)
         cmocka_unit_test(behind_a_fisheye_they_come_back_to_the_original_pixels),
         cmocka_unit_test(so_many_are_found_everywhere_and_none_where_nothing_is_used),
         cmocka_unit_test(a_blurred_picture_is_less_sharp_whatever_its_light),
+        cmocka_unit_test(the_outline_of_a_mask_makes_no_picture_sharp),
         cmocka_unit_test(a_file_gives_back_what_was_written_and_is_refused_when_it_is_damaged),
     };
 
