@@ -78,6 +78,8 @@ static int read_stages(struct lumi_parameters *parameters, struct lumi_error *er
         return lumi_fail(error, LUMI_ERR_ARG, "--masks %s: is no folder", o->masks);
     parameters->masks = o->masks;
     parameters->rolling_shutter = o->rolling_shutter;
+    parameters->backwards = o->backwards;
+    parameters->exchange = o->exchange;
     LUMI_TRY(read_choice("--calibrate", o->calibrate, &parameters->calibrate, error));
     LUMI_TRY(read_choice("--equalize", o->equalize, &parameters->equalize, error));
     LUMI_TRY(read_choice("--synthesize", o->synthesize, &parameters->synthesize, error));

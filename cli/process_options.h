@@ -8,7 +8,8 @@
 
 /* Values that the option tables of both commands write to. */
 struct process_options {
-    gboolean rolling_shutter;
+    gboolean rolling_shutter, backwards;
+    char *exchange;
     char *work, *projection, *fov, *shape, *kernel;
     char *masks, *calibrate, *equalize, *synthesize, *subsample, *prefilter, *stand; /* which stages there are */
     double density, pixels_per_degree, near_m, far_m, gp, disk_scale;
@@ -24,6 +25,8 @@ extern const struct process_options process_defaults;
     {"threads", 'j', 0, G_OPTION_ARG_INT, &process_options.threads, "threads (all)", "N"},                              \
     {"calibrate", 0, 0, G_OPTION_ARG_STRING, &process_options.calibrate, "find the cameras' poses in the pictures: auto, no, yes", "WHETHER"}, \
     {"masks", 0, 0, G_OPTION_ARG_FILENAME, &process_options.masks, "what is black there is of no use: pictures CAMERA.png or FRAME.png", "FOLDER"}, \
+    {"backwards", 0, 0, G_OPTION_ARG_NONE, &process_options.backwards, "the rig turned the other way than the capture says", NULL}, \
+    {"exchange", 0, 0, G_OPTION_ARG_STRING, &process_options.exchange, "cameras that are in each other's place on the rig", "A:B[,C:D...]"}, \
     {"rolling-shutter", 0, 0, G_OPTION_ARG_NONE, &process_options.rolling_shutter, "calibration: the rows of a picture were read one after the other while the rig turned", NULL}, \
     {"equalize", 0, 0, G_OPTION_ARG_STRING, &process_options.equalize, "even out exposure and vignetting between cameras: auto, no, yes", "WHETHER"}, \
     {"synthesize", 0, 0, G_OPTION_ARG_STRING, &process_options.synthesize, "views for the poles, and the stand filled in: auto, no, yes", "WHETHER"}, \

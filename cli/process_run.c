@@ -7,6 +7,7 @@
 #include "pipeline/engine/local.h"
 #include "pipeline/engine/slurm_run.h"
 #include "pipeline/graph/graph.h"
+#include "pipeline/hdr/merge_stage.h"
 #include "proto/base/file.h"
 
 #include <json-glib/json-glib.h>
@@ -37,13 +38,50 @@ static double peak_memory(void)
 
 static const struct lumi_run *running;
 
-/* What a person wants to know of a calibration at once; the rest is in the report. */
-static void say_calibration(void)
+#define REMARKS_SHOWN 20
+
+/* What the stage found, a line each; NULL: it finds nothing. */
+static char *remarks_of(const struct lumi_stage *stage)
 {
-    g_autofree char *line = lumi_calibrate_line(running);
+    if (stage == &lumi_stage_calibrate)
+        return lumi_calibrate_remarks(running);
+    return stage == &lumi_stage_merge ? lumi_merge_remarks(running) : NULL;
+}
+
+/* What a person wants to know of a stage at once; the rest is in its report. */
+static void say_remarks(const struct lumi_stage *stage)
+{
+    g_autofree char *text = remarks_of(stage);
+    g_autofree char *line = stage == &lumi_stage_calibrate ? lumi_calibrate_line(running) : NULL;
+    int shown = 0, more = 0;
 
     if (line)
         printf("  %s; %s/calibrate/report.txt\n", line, running->work);
+    g_auto(GStrv) lines = g_strsplit(text ? text : "", "\n", -1);
+    for (int i = 0; lines[i]; i++) {
+        if (!lines[i][0])
+            continue;
+        if (shown < REMARKS_SHOWN)
+            printf("  %s\n", lines[i]);
+        more += shown++ >= REMARKS_SHOWN;
+    }
+    if (more)
+        printf("  and %d more: %s/%s/report.txt\n", more, running->work, stage->name);
+}
+
+static void add_remarks(const struct lumi_stage *stage)
+{
+    g_autofree char *text = remarks_of(stage);
+
+    if (!text)
+        return;
+    g_auto(GStrv) lines = g_strsplit(text, "\n", -1);
+    json_builder_set_member_name(builder, "remarks");
+    json_builder_begin_array(builder);
+    for (int i = 0; lines[i]; i++)
+        if (lines[i][0])
+            json_builder_add_string_value(builder, lines[i]);
+    json_builder_end_array(builder);
 }
 
 static void report(const struct lumi_stage *stage, bool done, int outputs, int skipped)
@@ -58,8 +96,7 @@ static void report(const struct lumi_stage *stage, bool done, int outputs, int s
     if (!builder) {
         printf("%-18s %5d made %5d there %8.1f s %8.1f core-s %6.0f MB at most so far\n", stage->name,
                outputs - skipped, skipped, wall, cpu, peak_memory() / 1e6);
-        if (stage == &lumi_stage_calibrate)
-            say_calibration();
+        say_remarks(stage);
         fflush(stdout);
         return;
     }
@@ -76,6 +113,7 @@ static void report(const struct lumi_stage *stage, bool done, int outputs, int s
     json_builder_add_double_value(builder, cpu);
     json_builder_set_member_name(builder, "peak_bytes");
     json_builder_add_int_value(builder, (gint64)peak_memory());
+    add_remarks(stage);
     json_builder_end_object(builder);
 }
 
