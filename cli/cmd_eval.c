@@ -11,7 +11,7 @@
 
 static struct cli_render_options shared;
 static char *truth_file, *frames_regex, *difference, *sheet, *codec, *poses, *aligned, *aligned_truth;
-static int sheet_views = 12;
+static int sheet_views = 12, furthest = 5;
 static gboolean json, flicker;
 
 static const GOptionEntry options[] = {
@@ -27,6 +27,8 @@ static const GOptionEntry options[] = {
      "instead: how far these are from the truth's, after the best similarity: a work folder, a places file, a "
      "transforms.json, a COLMAP model's folder",
      "PATH"},
+    {"furthest", 0, 0, G_OPTION_ARG_INT, &furthest,
+     "with --poses: lists so many pictures, those furthest off first (5)", "N"},
     {"aligned", 0, 0, G_OPTION_ARG_FILENAME, &aligned,
      "the field's poses were found: its work folder or places file; the truth is brought over to them", "PATH"},
     {"aligned-truth", 0, 0, G_OPTION_ARG_FILENAME, &aligned_truth,
@@ -66,7 +68,7 @@ static int run_poses(struct lumi_error *error)
     LUMI_GOTO(code, out, lumi_pose_set_read(poses, &found, error));
     LUMI_GOTO(code, out, lumi_pose_set_read(truth_file, &truth, error));
     LUMI_GOTO(code, out, lumi_pose_error(&found, &truth, &result, error));
-    text = json ? lumi_pose_error_json(&result) : lumi_pose_error_text(&result);
+    text = json ? lumi_pose_error_json(&result, furthest) : lumi_pose_error_text(&result, furthest);
     printf("%s%s", text, json ? "\n" : "");
 out:
     g_free(text);
@@ -126,6 +128,8 @@ static int run(int argc, char **argv, struct lumi_error *error)
         return lumi_fail(error, LUMI_ERR_ARG, "--aligned PATH and --aligned-truth FILE go together");
     if (poses && (!truth_file || codec || argc))
         return lumi_fail(error, LUMI_ERR_ARG, "--poses PATH goes with --truth FILE alone");
+    if (furthest < 0)
+        return lumi_fail(error, LUMI_ERR_ARG, "--furthest: 0 and more are wanted");
     if (poses)
         return run_poses(error);
     if (argc != 1)

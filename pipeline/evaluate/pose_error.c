@@ -1,10 +1,12 @@
 /* Poses that were found, against the true ones. */
 #include "pipeline/evaluate/pose_error.h"
 
+#include "pipeline/calibrate/rotation.h"
 #include "pipeline/exchange/exchange.h"
 #include "pipeline/run/json_put.h"
 #include "pipeline/run/places.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #define MM 1000
@@ -117,6 +119,30 @@ static void shared_finish(struct shared *shared)
     g_free(shared->which);
 }
 
+static int furthest_first(const void *left, const void *right)
+{
+    const struct lumi_pose_off *a = left, *b = right;
+
+    if (a->position != b->position)
+        return a->position > b->position ? -1 : 1;
+    return strcmp(a->name, b->name);
+}
+
+static void list_all(const struct shared *s, const struct lumi_pose_set *truth,
+                     const struct lumi_similarity *similarity, struct lumi_pose_error *result)
+{
+    result->off = g_new0(struct lumi_pose_off, (gsize)s->count);
+    for (int i = 0; i < s->count; i++) {
+        struct lumi_pose moved;
+        lumi_similarity_apply(similarity, &s->a[i], &moved);
+        result->off[i] =
+            (struct lumi_pose_off){g_strdup(truth->names[s->which[i]]), lumi_length(lumi_sub(moved.t, s->b[i].t)),
+                                   lumi_rotation_angle(moved.r, s->b[i].r)};
+    }
+    result->worst_turned = result->off[result->distance.worst_turned].name;
+    qsort(result->off, (gsize)s->count, sizeof *result->off, furthest_first);
+}
+
 int lumi_pose_error(const struct lumi_pose_set *found, const struct lumi_pose_set *truth,
                     struct lumi_pose_error *result, struct lumi_error *error)
 {
@@ -129,8 +155,7 @@ int lumi_pose_error(const struct lumi_pose_set *found, const struct lumi_pose_se
     LUMI_GOTO(code, out, lumi_align(s.count, s.a, s.b, &similarity, error));
     LUMI_GOTO(code, out, lumi_pose_compare(s.count, s.a, s.b, &similarity, &result->distance, error));
     result->scale = similarity.scale;
-    result->worst = g_strdup(truth->names[s.which[result->distance.worst]]);
-    result->worst_turned = g_strdup(truth->names[s.which[result->distance.worst_turned]]);
+    list_all(&s, truth, &similarity, result);
 out:
     shared_finish(&s);
     return code;
@@ -155,24 +180,33 @@ int lumi_pose_set_align(const struct lumi_pose_set *truth, const struct lumi_pos
 
 void lumi_pose_error_finish(struct lumi_pose_error *result)
 {
-    g_free(result->worst);
-    g_free(result->worst_turned);
+    for (int i = 0; result->off && i < result->distance.count; i++)
+        g_free(result->off[i].name);
+    g_free(result->off);
     *result = (struct lumi_pose_error){0};
 }
 
-char *lumi_pose_error_text(const struct lumi_pose_error *r)
+char *lumi_pose_error_text(const struct lumi_pose_error *r, int listed)
 {
     const struct lumi_pose_distance *d = &r->distance;
+    GString *text = g_string_new(NULL);
 
-    return g_strdup_printf("poses: %d of %d; after the best similarity (scale %.6f):\n"
-                           "position  median %.3f mm, rms %.3f mm, worst %.3f mm (%s)\n"
-                           "rotation  median %.4f°, rms %.4f°, worst %.4f° (%s)\n",
-                           d->count, r->truths, r->scale, MM * d->median_m, MM * d->rms_m, MM * d->worst_m, r->worst,
-                           DEGREES * d->median_rotation, DEGREES * d->rms_rotation, DEGREES * d->worst_rotation,
-                           r->worst_turned);
+    g_string_printf(text,
+                    "poses: %d of %d; after the best similarity (scale %.6f):\n"
+                    "position  median %.3f mm, rms %.3f mm, worst %.3f mm (%s)\n"
+                    "rotation  median %.4f°, rms %.4f°, worst %.4f° (%s)\n",
+                    d->count, r->truths, r->scale, MM * d->median_m, MM * d->rms_m, MM * d->worst_m, r->off[0].name,
+                    DEGREES * d->median_rotation, DEGREES * d->rms_rotation, DEGREES * d->worst_rotation,
+                    r->worst_turned);
+    if (listed > 0)
+        g_string_append(text, "furthest off:\n");
+    for (int i = 0; i < MIN(listed, d->count); i++)
+        g_string_append_printf(text, "  %-12s %8.3f mm  %.4f°\n", r->off[i].name, MM * r->off[i].position,
+                               DEGREES * r->off[i].rotation);
+    return g_string_free(text, FALSE);
 }
 
-char *lumi_pose_error_json(const struct lumi_pose_error *r)
+char *lumi_pose_error_json(const struct lumi_pose_error *r, int listed)
 {
     g_autoptr(JsonBuilder) builder = json_builder_new();
     const struct lumi_pose_distance *d = &r->distance;
@@ -187,6 +221,16 @@ char *lumi_pose_error_json(const struct lumi_pose_error *r)
     lumi_put_double(builder, "rotation_median_degrees", DEGREES * d->median_rotation);
     lumi_put_double(builder, "rotation_rms_degrees", DEGREES * d->rms_rotation);
     lumi_put_double(builder, "rotation_worst_degrees", DEGREES * d->worst_rotation);
-    lumi_put_string(builder, "worst", r->worst);
+    lumi_put_string(builder, "worst", r->off[0].name);
+    json_builder_set_member_name(builder, "furthest");
+    json_builder_begin_array(builder);
+    for (int i = 0; i < MIN(listed, d->count); i++) {
+        json_builder_begin_object(builder);
+        lumi_put_string(builder, "name", r->off[i].name);
+        lumi_put_double(builder, "position_mm", MM * r->off[i].position);
+        lumi_put_double(builder, "rotation_degrees", DEGREES * r->off[i].rotation);
+        json_builder_end_object(builder);
+    }
+    json_builder_end_array(builder);
     return lumi_put_end(builder, FALSE);
 }

@@ -23,18 +23,25 @@ void lumi_pose_set_finish(struct lumi_pose_set *set);
 int lumi_pose_set_align(const struct lumi_pose_set *truth, const struct lumi_pose_set *found, struct lumi_pose *poses,
                         size_t stride, int count, struct lumi_error *error);
 
+/* One picture's; `name` is owned. */
+struct lumi_pose_off {
+    char *name;
+    double position, rotation; /* metres, radians */
+};
+
 struct lumi_pose_error {
     int truths; /* pictures that have a true pose; distance.count of them were found */
     double scale;
     struct lumi_pose_distance distance; /* after the best similarity */
-    char *worst, *worst_turned;         /* their names, owned */
+    struct lumi_pose_off *off;          /* distance.count of them, the furthest from its place first */
+    char *worst_turned;                 /* name of the one that is turned the most; owned by `off` */
 };
 /* LUMI_ERR_FORMAT where too few names are in both. */
 int lumi_pose_error(const struct lumi_pose_set *found, const struct lumi_pose_set *truth,
                     struct lumi_pose_error *result, struct lumi_error *error);
 void lumi_pose_error_finish(struct lumi_pose_error *result);
-/* Free with g_free. */
-char *lumi_pose_error_text(const struct lumi_pose_error *result);
-char *lumi_pose_error_json(const struct lumi_pose_error *result);
+/* With the `listed` pictures that are furthest off. Free with g_free. */
+char *lumi_pose_error_text(const struct lumi_pose_error *result, int listed);
+char *lumi_pose_error_json(const struct lumi_pose_error *result, int listed);
 
 #endif
