@@ -145,7 +145,7 @@ int lumi_bundle_solve(struct lumi_bundle *b, const struct lumi_bundle_settings *
 {
     struct problem p = {.shim = shim_problem_create()};
     struct shim_summary summary = {0};
-    struct shim_options options = {.solver = b->camera_count > 40 ? SHIM_SPARSE_SCHUR : SHIM_DENSE_SCHUR,
+    struct shim_options options = {.solver = b->camera_count > 40 ? SHIM_ITERATIVE_SCHUR : SHIM_DENSE_SCHUR,
                                    .iterations = s->iterations,
                                    .function_tolerance = s->tolerance};
     bool ok = p.shim != NULL;

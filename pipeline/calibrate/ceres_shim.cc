@@ -199,13 +199,17 @@ void shim_eliminate_first(struct shim_problem *problem, double *block)
 void shim_solve(struct shim_problem *problem, const struct shim_options *options, struct shim_summary *summary)
 try {
     static const ceres::LinearSolverType types[] = {ceres::DENSE_QR, ceres::SPARSE_SCHUR, ceres::DENSE_SCHUR,
-                                                    ceres::SPARSE_NORMAL_CHOLESKY};
+                                                    ceres::SPARSE_NORMAL_CHOLESKY, ceres::ITERATIVE_SCHUR};
     ceres::Solver::Options given;
     ceres::Solver::Summary said;
 
     given.linear_solver_type = types[options->solver];
     /* CHOLMOD stands on whatever BLAS is installed, and some give other bytes from call to call. */
     given.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
+    /* Coarser steps are no cheaper altogether: more of them are wanted. */
+    given.preconditioner_type = ceres::SCHUR_JACOBI;
+    given.use_explicit_schur_complement = true;
+    given.eta = 0.01;
     given.max_num_iterations = options->iterations;
     given.function_tolerance = options->function_tolerance > 0 ? options->function_tolerance : 1e-6;
     given.num_threads = 1;

@@ -42,7 +42,13 @@ bool shim_add_residual(struct shim_problem *problem, shim_residual function, con
  */
 void shim_eliminate_first(struct shim_problem *problem, double *block);
 
-enum shim_solver { SHIM_DENSE_QR = 0, SHIM_SPARSE_SCHUR = 1, SHIM_DENSE_SCHUR = 2, SHIM_SPARSE_CHOLESKY = 3 };
+enum shim_solver {
+    SHIM_DENSE_QR = 0,
+    SHIM_SPARSE_SCHUR = 1,
+    SHIM_DENSE_SCHUR = 2,
+    SHIM_SPARSE_CHOLESKY = 3,
+    SHIM_ITERATIVE_SCHUR = 4 /* for many blocks that stay: each step only to a hundredth, by conjugate gradients */
+};
 struct shim_options {
     enum shim_solver solver;
     int iterations;

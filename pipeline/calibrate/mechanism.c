@@ -112,7 +112,7 @@ static int solved(struct problem *p, bool ok, const struct shim_options *options
 }
 
 static bool add_seen(struct lumi_mechanism *m, struct lumi_bundle *b, struct problem *p,
-                     struct mechanism_measured *measured, double loss)
+                     struct mechanism_measured *measured, struct mechanism_memo *memos, double loss)
 {
     int sizes[MECHANISM_BLOCKS + 1];
     bool ok = true;
@@ -130,7 +130,7 @@ static bool add_seen(struct lumi_mechanism *m, struct lumi_bundle *b, struct pro
                 continue;
             mechanism_blocks(m, frame, blocks);
             blocks[MECHANISM_BLOCKS] = b->points[point].block;
-            measured[i] = (struct mechanism_measured){m, b, i};
+            measured[i] = (struct mechanism_measured){m, b, i, &memos[frame]};
             ok = shim_add_residual(p->shim, mechanism_seen_residual, &measured[i], 2, blocks, sizes,
                                    MECHANISM_BLOCKS + 1, loss > 0 ? SHIM_LOSS_CAUCHY : SHIM_LOSS_NONE, loss);
         }
@@ -160,13 +160,15 @@ int lumi_mechanism_solve(struct lumi_mechanism *m, struct lumi_bundle *b, double
                          struct lumi_error *error)
 {
     struct mechanism_measured *measured = lumi_calloc((size_t)b->observation_count + 1, sizeof *measured);
+    struct mechanism_memo *memos = lumi_calloc((size_t)b->camera_count + 1, sizeof *memos);
     struct shim_options options = {.solver = SHIM_SPARSE_SCHUR, .iterations = iterations, .function_tolerance = 1e-5};
     struct problem p = {0};
-    bool ok = measured && begin(m, prior_weight(b), &p) && add_seen(m, b, &p, measured, loss);
+    bool ok = measured && memos && begin(m, prior_weight(b), &p) && add_seen(m, b, &p, measured, memos, loss);
     int code = solved(&p, ok, &options, error);
 
     shim_problem_destroy(p.shim);
     lumi_free(measured);
+    lumi_free(memos);
     for (int i = 0; i < m->frame_count && code == LUMI_OK; i++)
         if (m->frames[i].camera >= 0)
             lumi_mechanism_pose(m, i, &b->cameras[i].pose);

@@ -172,7 +172,8 @@ static void the_mechanism_has_the_right_derivatives(void **state)
                          &s.mechanism.drop[knot],      &s.mechanism.drop[knot + 1], s.bundle.points[o->point].block};
     for (int i = 0; i < LUMI_MOUNT_NUMBERS; i++)
         blocks[0][i] = 0.01 * (i + 1);
-    const struct mechanism_measured seen = {&s.mechanism, &s.bundle, at};
+    struct mechanism_memo memo = {0};
+    const struct mechanism_measured seen = {&s.mechanism, &s.bundle, at, &memo};
     compare_slopes(mechanism_seen_residual, &seen, 2, 6, sizes, blocks, 1e-6, 1e-5);
     const struct mechanism_found found = {&s.mechanism, &s.truth[o->camera], o->camera, 0.005, 0.01};
     compare_slopes(mechanism_found_residual, &found, 6, 5, sizes, blocks, 1e-6, 1e-5);
