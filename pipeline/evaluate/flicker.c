@@ -28,7 +28,7 @@ static int read_frame(struct lumi_renderer *renderer, const struct lumi_truth *t
 static void add(const struct frame *before, const struct frame *after, struct lumi_flicker *result)
 {
     const int values = 3 * before->truth.width;
-    long long rendered = 0, truth = 0, flicker = 0;
+    long long rendered = 0, truth = 0, flicker = 0, jumps = 0;
 
     for (int y = 0; y < before->truth.height; y++) {
         const uint8_t *r0 = lumi_row_u8(&before->rendered.color, y), *r1 = lumi_row_u8(&after->rendered.color, y);
@@ -38,12 +38,14 @@ static void add(const struct frame *before, const struct frame *after, struct lu
             rendered += abs(r);
             truth += abs(t);
             flicker += abs(r - t);
+            jumps += abs(r) > abs(t) + LUMI_FLICKER_JUMP;
         }
     }
     const double count = (double)values * before->truth.height;
     result->rendered += (double)rendered / count;
     result->truth += (double)truth / count;
     result->flicker += (double)flicker / count;
+    result->jumps += (double)jumps / count;
 }
 
 static int check_frames(const struct lumi_truth_set *truth, struct lumi_error *error)
@@ -85,6 +87,7 @@ int lumi_flicker(const char *field, const struct lumi_truth_set *truth, const st
     result->rendered /= truth->count - 1;
     result->truth /= truth->count - 1;
     result->flicker /= truth->count - 1;
+    result->jumps /= truth->count - 1;
 out:
     frame_finish(&before);
     frame_finish(&after);
@@ -95,12 +98,12 @@ out:
 char *lumi_flicker_text(const struct lumi_flicker *f)
 {
     return g_strdup_printf("%d frames; mean difference between neighbours, grey levels: rendered %.3f, truth %.3f, "
-                           "flicker (of one from the other) %.3f\n",
-                           f->frames, f->rendered, f->truth, f->flicker);
+                           "flicker (of one from the other) %.3f; %.3f %% change by over %d more than the truth\n",
+                           f->frames, f->rendered, f->truth, f->flicker, 100 * f->jumps, LUMI_FLICKER_JUMP);
 }
 
 char *lumi_flicker_json(const struct lumi_flicker *f)
 {
-    return g_strdup_printf("{\"frames\":%d,\"rendered\":%.6f,\"truth\":%.6f,\"flicker\":%.6f}", f->frames, f->rendered,
-                           f->truth, f->flicker);
+    return g_strdup_printf("{\"frames\":%d,\"rendered\":%.6f,\"truth\":%.6f,\"flicker\":%.6f,\"jumps\":%.6f}",
+                           f->frames, f->rendered, f->truth, f->flicker, f->jumps);
 }

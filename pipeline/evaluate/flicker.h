@@ -4,12 +4,15 @@
 
 #include "pipeline/evaluate/evaluate.h"
 
+#define LUMI_FLICKER_JUMP 8 /* grey levels */
+
 /* Means over all pixels, channels and neighbouring frames, grey levels of 255. */
 struct lumi_flicker {
     int frames;
     double rendered; /* |R(t+1) − R(t)| */
     double truth;    /* |T(t+1) − T(t)| */
     double flicker;  /* |(R(t+1) − R(t)) − (T(t+1) − T(t))| */
+    double jumps;    /* share of values with |R(t+1) − R(t)| > |T(t+1) − T(t)| + LUMI_FLICKER_JUMP */
 };
 
 /* The truth's pictures are the frames, in their order; two at least, all of one size. Of `options` render and progress
