@@ -13,7 +13,7 @@ static char *output, *images, *every, *flip;
 static int limit, threads;
 static double unit, focal, fov, plane;
 static gboolean trust, strict;
-static char *rig_name, *plan_path, *brackets, *marks, *white_balance, **cameras;
+static char *rig_name, *plan_path, *lens_path, *brackets, *marks, *white_balance, **cameras;
 
 static const GOptionEntry options[] = {
     {"output", 'o', 0, G_OPTION_ARG_FILENAME, &output, "the capture to make (needed)", "CAPTURE"},
@@ -34,6 +34,8 @@ static const GOptionEntry options[] = {
      "NAME=FOLDER"},
     {"plan", 0, 0, G_OPTION_ARG_FILENAME, &plan_path, "the sweep's plan, where it is not what the profile is meant for",
      "FILE"},
+    {"lens", 0, 0, G_OPTION_ARG_FILENAME, &lens_path,
+     "the rig's lens of the same name, as 'lumi calibrate lens' wrote it, instead of the profile's", "FILE"},
     {"brackets", 0, 0, G_OPTION_ARG_STRING, &brackets,
      "stops of the shots at every position, in their order (found from the exposures)", "-2,0,2"},
     {"white-balance", 0, 0, G_OPTION_ARG_STRING, &white_balance,
@@ -148,6 +150,8 @@ static int run_ingest(const char *folder, const char *date, struct lumi_error *e
 
     lumi_ingest_options_init(&ingest);
     LUMI_TRY(cli_read_rig(rig_name, &rig, error));
+    if (lens_path)
+        LUMI_TRY(cli_change_lenses(lens_path, &rig, error));
     if (plan_path) {
         LUMI_TRY(cli_read_plan(plan_path, &rig, &plan, error));
         ingest.plan = &plan;
@@ -208,10 +212,10 @@ static int run_import(int argc, char **argv, struct lumi_error *error)
                          "--focal, --fov and --plane");
     if (rig_name)
         return run_ingest(argc > 0 ? argv[0] : NULL, date, error);
-    if (cameras || plan_path || brackets || marks || white_balance || strict)
+    if (cameras || plan_path || lens_path || brackets || marks || white_balance || strict)
         return lumi_fail(
             error, LUMI_ERR_ARG,
-            "--camera, --plan, --brackets, --white-balance, --marks and --strict want a rig: --rig PROFILE");
+            "--camera, --plan, --lens, --brackets, --white-balance, --marks and --strict want a rig: --rig PROFILE");
     if (argc < 1)
         return lumi_fail(error, LUMI_ERR_ARG, "from where? SOURCE is needed");
     return run_list(argv[0], date, error);

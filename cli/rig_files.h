@@ -9,4 +9,8 @@ int cli_read_rig(const char *name, struct lumi_rig *rig, struct lumi_error *erro
 /* A file in the form of docs/rig-plan.md, checked against the rig. */
 int cli_read_plan(const char *path, const struct lumi_rig *rig, struct lumi_plan *plan, struct lumi_error *error);
 
+/* Puts lenses of a file of `[lens NAME]` sections (lumi calibrate lens) in the place of the rig's of these names; where
+ * both have one lens, whatever it is called. */
+int cli_change_lenses(const char *path, struct lumi_rig *rig, struct lumi_error *error);
+
 #endif

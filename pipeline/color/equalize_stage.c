@@ -32,6 +32,7 @@ static int key(struct lumi_run *run, int index, struct lumi_key *k, struct lumi_
         lumi_key_bytes(k, run->sources[i].name, strlen(run->sources[i].name) + 1);
         lumi_key_lens(k, &run->sources[i].lens);
         lumi_key_image(k, run, i);
+        lumi_key_white(k, &run->sources[i]);
         lumi_key_input(k, run, "features", i);
         lumi_key_input(k, run, "pairs", i);
     }
@@ -78,7 +79,7 @@ static int read_linear(const struct lumi_run *run, int index, struct lumi_raster
     g_autofree char *path = lumi_run_image(run, index);
     struct lumi_raster raster;
 
-    LUMI_TRY(lumi_image_read(path, 3, &raster, NULL, error));
+    LUMI_TRY(lumi_source_read(&run->sources[index], path, &raster, error));
     if (raster.sample == LUMI_F32) {
         *linear = raster;
         return LUMI_OK;
@@ -291,7 +292,7 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
 const struct lumi_stage lumi_stage_equalize = {
     .name = "equalize",
     .title = "exposure and vignetting",
-    .version = 1,
+    .version = 2,
     .extension = ".json",
     .whole = true,
     .set = LUMI_SET_DENSE,

@@ -5,14 +5,6 @@ lumi=$1 make_cards=$2 make_dng=$3
 # shellcheck source=tests/scenario/expect.sh
 . "$(dirname "$0")/expect.sh"
 cd "$scratch" || exit 1
-frames() { # CAPTURE: how many there are of it
-    find "$1/data/frames" -type f | wc -l
-}
-said() { # PART...: the last command did
-    for part in "$@"; do
-        echo "$out" | grep -Fq -e "$part" || fail "not said: '$part' in: $out"
-    done
-}
 
 "$lumi" sim shoot object --rig arc:3x12:0.35 --size 100x80 --format jpeg -o a -j 2 >/dev/null || fail "no capture"
 pictures=$(frames a)
@@ -95,6 +87,15 @@ done
 cmp -s 1,1,1.sum auto.sum && fail "--white-balance auto is none"
 expect_line 2 "factors of 0.01 to 100" "$lumi" import raw --rig cards.rig --white-balance 0,1,1 -o x
 expect_line 2 "--white-balance" "$lumi" import raw --rig cards.rig --white-balance warm -o x
+
+# A lens that was calibrated stands in for the profile's, whatever it is called.
+sed -n '/^\[lens/,/^$/p' cards.rig | sed 's/^\[lens .*/[lens mine]/; s/^fx = .*/fx = 47.25/' >mine.lens
+expect 0 "" "$lumi" import cards --rig cards.rig --lens mine.lens -o lens -j 2
+"$lumi" export lens --transforms lens.json || fail "export"
+grep -q '"fl_x": *47.25' lens.json || fail "the lens is the profile's"
+expect_line 3 "no section [lens" "$lumi" import cards --rig cards.rig --lens script -o x
+printf '[lens mine]\nmodel = fisheye\nwidth = none\n' >bad.lens
+expect_line 3 "bad.lens:3" "$lumi" import cards --rig cards.rig --lens bad.lens -o x
 
 # Command lines and inputs that cannot be.
 expect_line 3 "none: reading the folder" "$lumi" import none --rig cards.rig -o x

@@ -25,3 +25,11 @@ expect_line() { # STATUS PART COMMAND...: exit status, one line on standard erro
     [ "$(echo "$out" | wc -l)" -eq 1 ] || fail "'$*' did not say one line: $out"
     echo "$out" | grep -Fq -e "$part" || fail "'$*' did not say '$part': $out"
 }
+frames() { # CAPTURE: how many frames there are in it
+    find "$1/data/frames" -type f | wc -l
+}
+said() { # PART...: what `expect` ran last did
+    for part in "$@"; do
+        echo "$out" | grep -Fq -e "$part" || fail "not said: '$part' in: $out"
+    done
+}

@@ -6,14 +6,6 @@ lumi=$1 make_films=$2
 # shellcheck source=tests/scenario/expect.sh
 . "$(dirname "$0")/expect.sh"
 cd "$scratch" || exit 1
-frames() { # CAPTURE: how many there are of it
-    find "$1/data/frames" -type f | wc -l
-}
-said() { # PART...: the last command did
-    for part in "$@"; do
-        echo "$out" | grep -Fq -e "$part" || fail "not said: '$part' in: $out"
-    done
-}
 taken() { # CAPTURE CAMERA: when its pictures were taken, in order
     "$lumi" export "$1" --transforms - --original-names 2>/dev/null | grep -o "$2.mkv@[0-9.]*" ||
         { "$lumi" export "$1" --transforms names.json --original-names && grep -o "$2.mkv@[0-9.]*" names.json; }

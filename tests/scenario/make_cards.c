@@ -13,54 +13,23 @@
  *   bracket STOPS STOPS STOPS    every position is taken three times, with these exposures */
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
-#include "proto/capture/capture.h"
 #include "proto/image/image.h"
+#include "tests/scenario/camera_script.h"
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 
-#define LINES 64
-
-struct line {
-    char what[16], camera[32];
-    double a, b;
-};
-static struct line lines[LINES];
-static int line_count;
 static double pace = 0.5, stops[3];
 static bool bracketed;
 
-static int read_script(const char *path)
+static bool take_setting(const char *line)
 {
-    char text[256];
-    FILE *file = fopen(path, "r");
-
-    if (!file)
-        return -1;
-    while (fgets(text, sizeof text, file) && line_count < LINES) {
-        struct line *line = &lines[line_count];
-        memset(line, 0, sizeof *line);
-        if (sscanf(text, "pace %lf", &pace) == 1)
-            continue;
-        if (sscanf(text, "bracket %lf %lf %lf", &stops[0], &stops[1], &stops[2]) == 3)
-            bracketed = true;
-        else if (sscanf(text, "%15s %31s %lf %lf", line->what, line->camera, &line->a, &line->b) >= 3)
-            line_count++;
-    }
-    fclose(file);
-    return 0;
-}
-
-static const struct line *find(const char *what, const char *camera, int shot)
-{
-    for (int i = 0; i < line_count; i++)
-        if (!strcmp(lines[i].what, what) && !strcmp(lines[i].camera, camera) && (shot < 0 || (int)lines[i].a == shot))
-            return &lines[i];
-    return NULL;
+    if (sscanf(line, "bracket %lf %lf %lf", &stops[0], &stops[1], &stops[2]) == 3)
+        return bracketed = true;
+    return sscanf(line, "pace %lf", &pace) == 1;
 }
 
 /* An EXIF block, little-endian: DateTimeOriginal, its part of a second, exposure time, ISO 100. */
@@ -134,7 +103,7 @@ static int write_picture(const char *folder, const struct lumi_raster *raster, d
 
 static double clock_of(const char *camera, double time)
 {
-    const struct line *clock = find("clock", camera, -1);
+    const struct script_line *clock = script_find("clock", camera, -1);
 
     return 1790000000 + 100 + time * (1 + (clock ? clock->b * 1e-6 : 0)) + (clock ? clock->a : 0);
 }
@@ -142,9 +111,11 @@ static double clock_of(const char *camera, double time)
 static int write_tests(const char *folder, const char *camera, bool before, const struct lumi_raster *raster,
                        double end, int *number, struct lumi_error *error)
 {
-    for (int i = 0; i < line_count; i++)
-        if (!strcmp(lines[i].what, "test") && !strcmp(lines[i].camera, camera) && (lines[i].a > 0) == before)
-            LUMI_TRY(write_picture(folder, raster, clock_of(camera, before ? -lines[i].a : end - lines[i].a), 0.004,
+    for (int i = 0; i < script_line_count; i++)
+        if (!strcmp(script_lines[i].what, "test") && !strcmp(script_lines[i].camera, camera) &&
+            (script_lines[i].a > 0) == before)
+            LUMI_TRY(write_picture(folder, raster,
+                                   clock_of(camera, before ? -script_lines[i].a : end - script_lines[i].a), 0.004,
                                    number, 1, false, error));
     return LUMI_OK;
 }
@@ -152,15 +123,16 @@ static int write_tests(const char *folder, const char *camera, bool before, cons
 static int write_shot(const char *folder, const char *camera, int position, const struct lumi_raster *raster,
                       int *number, struct lumi_error *error)
 {
-    const struct line *stop = find("stop", camera, -1);
+    const struct script_line *stop = script_find("stop", camera, -1);
 
     for (int k = 0; k < (bracketed ? 3 : 1); k++) {
         int shot = bracketed ? 3 * position + k : position;
         double time = bracketed ? 4 * pace * position + pace * k : pace * position;
-        if (find("skip", camera, shot) || (stop && shot >= stop->a))
+        if (script_find("skip", camera, shot) || (stop && shot >= stop->a))
             continue;
         LUMI_TRY(write_picture(folder, raster, clock_of(camera, time), 0.01 * exp2(stops[k]), number,
-                               find("copy", camera, shot) ? 2 : 1, find("cut", camera, shot) != NULL, error));
+                               script_find("copy", camera, shot) ? 2 : 1, script_find("cut", camera, shot) != NULL,
+                               error));
     }
     return LUMI_OK;
 }
@@ -168,8 +140,8 @@ static int write_shot(const char *folder, const char *camera, int position, cons
 static int write_camera(struct lumi_capture *capture, const struct lumi_capture_frame *frames, int count,
                         const char *out, const char *camera, struct lumi_error *error)
 {
-    const struct line *first = find("number", camera, -1);
-    struct lumi_raster raster = {0}, bytes = {0};
+    const struct script_line *first = script_find("number", camera, -1);
+    struct lumi_raster bytes = {0};
     int number = first ? (int)first->a : 1, position = 0, code = LUMI_OK;
     char folder[512];
 
@@ -178,12 +150,7 @@ static int write_camera(struct lumi_capture *capture, const struct lumi_capture_
         if (strcmp(frames[i].camera_name, camera) != 0)
             continue;
         lumi_raster_finish(&bytes);
-        char *path = lumi_capture_join(capture, frames[i].file);
-        code = lumi_image_read(path, 3, &raster, NULL, error);
-        lumi_free(path);
-        if (code == LUMI_OK)
-            code = lumi_raster_convert(&raster, LUMI_U8, &bytes);
-        lumi_raster_finish(&raster);
+        code = camera_script_picture(capture, &frames[i], &bytes, error);
         if (code == LUMI_OK && position == 0)
             code = write_tests(folder, camera, true, &bytes, 0, &number, error);
         if (code == LUMI_OK)
@@ -195,37 +162,9 @@ static int write_camera(struct lumi_capture *capture, const struct lumi_capture_
     return code;
 }
 
-static int write_profile(struct lumi_capture *capture, const char *out, struct lumi_error *error)
-{
-    char path[512], *text;
-
-    LUMI_TRY(lumi_capture_get_profile(capture, &text, error));
-    snprintf(path, sizeof path, "%s.rig", out);
-    int code = lumi_file_write(path, text, strlen(text), false, error);
-    lumi_free(text);
-    return code;
-}
-
 int main(int argc, char **argv)
 {
-    struct lumi_capture *capture = NULL;
-    struct lumi_capture_frame *frames = NULL;
-    struct lumi_error error = {0};
-    char name[LUMI_CAPTURE_NAME];
-    int count = 0, code;
-    int64_t id;
+    const struct camera_script script = {"make_cards", take_setting, NULL, write_camera};
 
-    if (argc != 4 || read_script(argv[3]) != 0)
-        return 2;
-    LUMI_GOTO(code, done, lumi_capture_open(argv[1], LUMI_CAPTURE_READ, &capture, &error));
-    LUMI_GOTO(code, done, write_profile(capture, argv[2], &error));
-    LUMI_GOTO(code, done, lumi_capture_frames(capture, LUMI_FRAMES_USABLE, &frames, &count, &error));
-    for (int c = 0; lumi_capture_camera(capture, c, &id, name, &error) == LUMI_OK; c++)
-        LUMI_GOTO(code, done, write_camera(capture, frames, count, argv[2], name, &error));
-done:
-    lumi_free(frames);
-    lumi_capture_close(capture);
-    if (code != LUMI_OK)
-        fprintf(stderr, "make_cards: %s\n", error.text);
-    return lumi_exit_status(code);
+    return camera_script_run(&script, argc, argv);
 }

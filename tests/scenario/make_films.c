@@ -14,9 +14,9 @@
 #include "pipeline/exchange/film_lamp.h"
 #include "proto/base/file.h"
 #include "proto/base/memory.h"
-#include "proto/capture/capture.h"
 #include "proto/image/image.h"
 #include "proto/mechanism/rig.h"
+#include "tests/scenario/camera_script.h"
 
 #include <libavformat/avformat.h>
 #include <math.h>
@@ -25,46 +25,26 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#define LINES 64
 #define PICTURES 256
 #define SOUND_RATE 8000
 #define TAIL 5.0 /* s it goes on recording */
 
-struct line {
-    char what[16], camera[32];
-    double a, b;
-};
-static struct line lines[LINES];
-static int line_count;
 static double rate = 20, turn = 8, bit = 0.2;
 
-static int read_script(const char *path)
+static bool take_setting(const char *line)
 {
-    char text[256];
-    FILE *file = fopen(path, "r");
-
-    if (!file)
-        return -1;
-    while (fgets(text, sizeof text, file) && line_count < LINES) {
-        struct line *line = &lines[line_count];
-        memset(line, 0, sizeof *line);
-        if (sscanf(text, "rate %lf", &rate) == 1 || sscanf(text, "turn %lf", &turn) == 1)
-            continue;
-        if (sscanf(text, "%15s %31s %lf %lf", line->what, line->camera, &line->a, &line->b) >= 3)
-            line_count++;
-    }
-    fclose(file);
-    return 0;
+    return sscanf(line, "rate %lf", &rate) == 1 || sscanf(line, "turn %lf", &turn) == 1;
 }
 
-static const struct line *find(const char *what, const char *camera, double number)
+static bool dropped(const char *camera, int number)
 {
-    for (int i = 0; i < line_count; i++)
-        if (!strcmp(lines[i].what, what) && !strcmp(lines[i].camera, camera) &&
-            (number < 0 || lines[i].a == number ||
-             (!strcmp(what, "drop") && number >= lines[i].a && number < lines[i].a + lines[i].b)))
-            return &lines[i];
-    return NULL;
+    for (int i = 0; i < script_line_count; i++) {
+        const struct script_line *line = &script_lines[i];
+        if (!strcmp(line->what, "drop") && !strcmp(line->camera, camera) && number >= line->a &&
+            number < line->a + line->b)
+            return true;
+    }
+    return false;
 }
 
 static bool lamp_lit(double time)
@@ -156,7 +136,7 @@ static int write_picture(struct film *film, const char *camera, int number, doub
     options.format = LUMI_IMAGE_JPEG;
     options.subsample = true;
     LUMI_TRY(lumi_image_encode(raster, &options, &data, &size, error));
-    if (find("break", camera, number))
+    if (script_find("break", camera, number))
         for (size_t i = size / 2; i < size; i++)
             data[i] = (uint8_t)(i * 37);
     int code = put(film, film->video, data, size, time);
@@ -167,10 +147,10 @@ static int write_picture(struct film *film, const char *camera, int number, doub
 static int write_film(const char *path, const char *camera, const struct lumi_raster *pictures, int count,
                       struct lumi_error *error)
 {
-    const struct line *lead = find("lead", camera, -1);
+    const struct script_line *lead = script_find("lead", camera, -1);
     double begin = -(lead ? lead->a : 2);
     int total = (int)((turn + TAIL - begin) * rate), block = (int)(SOUND_RATE / rate);
-    bool mute = find("mute", camera, -1) != NULL;
+    bool mute = script_find("mute", camera, -1) != NULL;
     struct lumi_raster picture;
     struct film film = {0};
     int16_t samples[SOUND_RATE];
@@ -181,9 +161,9 @@ static int write_film(const char *path, const char *camera, const struct lumi_ra
                    : LUMI_OK;
     for (int i = 0; code == LUMI_OK && i < total; i++) {
         double time = i / rate;
-        if (!find("double", camera, i))
-            mix(pictures, count, begin + time, find("dark", camera, -1) != NULL, &picture);
-        if (!find("drop", camera, i))
+        if (!script_find("double", camera, i))
+            mix(pictures, count, begin + time, script_find("dark", camera, -1) != NULL, &picture);
+        if (!dropped(camera, i))
             code = write_picture(&film, camera, i, time, &picture, error);
         click(samples, block, begin + time);
         if (code == LUMI_OK && !mute && put(&film, film.sound, samples, 2 * (size_t)block, time) < 0)
@@ -203,19 +183,13 @@ static int write_camera(struct lumi_capture *capture, const struct lumi_capture_
                         const char *out, const char *camera, struct lumi_error *error)
 {
     static struct lumi_raster pictures[PICTURES];
-    struct lumi_raster raster;
     int count = 0, code = LUMI_OK;
     char path[512];
 
     for (int i = 0; code == LUMI_OK && i < frame_count && count < PICTURES; i++) {
         if (strcmp(frames[i].camera_name, camera) != 0)
             continue;
-        char *file = lumi_capture_join(capture, frames[i].file);
-        code = lumi_image_read(file, 3, &raster, NULL, error);
-        lumi_free(file);
-        if (code == LUMI_OK)
-            code = lumi_raster_convert(&raster, LUMI_U8, &pictures[count++]);
-        lumi_raster_finish(&raster);
+        code = camera_script_picture(capture, &frames[i], &pictures[count++], error);
     }
     snprintf(path, sizeof path, "%s/%s.mkv", out, camera);
     if (code == LUMI_OK)
@@ -225,42 +199,19 @@ static int write_camera(struct lumi_capture *capture, const struct lumi_capture_
     return code;
 }
 
-static int write_profile(struct lumi_capture *capture, const char *out, struct lumi_error *error)
+static int begin(const char *out, const char *profile, struct lumi_error *error)
 {
     struct lumi_rig rig;
-    char path[512], *text;
 
-    LUMI_TRY(lumi_capture_get_profile(capture, &text, error));
-    snprintf(path, sizeof path, "%s.rig", out);
-    int code = lumi_file_write(path, text, strlen(text), false, error);
-    if (code == LUMI_OK)
-        code = lumi_rig_parse(text, strlen(text), path, &rig, error);
-    bit = code == LUMI_OK ? rig.control.video.lamp_bit : bit;
-    lumi_free(text);
-    return code;
+    mkdir(out, 0777);
+    LUMI_TRY(lumi_rig_parse(profile, strlen(profile), out, &rig, error));
+    bit = rig.control.video.lamp_bit;
+    return LUMI_OK;
 }
 
 int main(int argc, char **argv)
 {
-    struct lumi_capture *capture = NULL;
-    struct lumi_capture_frame *frames = NULL;
-    struct lumi_error error = {0};
-    char name[LUMI_CAPTURE_NAME];
-    int count = 0, code;
-    int64_t id;
+    const struct camera_script script = {"make_films", take_setting, begin, write_camera};
 
-    if (argc != 4 || read_script(argv[3]) != 0)
-        return 2;
-    mkdir(argv[2], 0777);
-    LUMI_GOTO(code, done, lumi_capture_open(argv[1], LUMI_CAPTURE_READ, &capture, &error));
-    LUMI_GOTO(code, done, write_profile(capture, argv[2], &error));
-    LUMI_GOTO(code, done, lumi_capture_frames(capture, LUMI_FRAMES_USABLE, &frames, &count, &error));
-    for (int c = 0; lumi_capture_camera(capture, c, &id, name, &error) == LUMI_OK; c++)
-        LUMI_GOTO(code, done, write_camera(capture, frames, count, argv[2], name, &error));
-done:
-    lumi_free(frames);
-    lumi_capture_close(capture);
-    if (code != LUMI_OK)
-        fprintf(stderr, "make_films: %s\n", error.text);
-    return lumi_exit_status(code);
+    return camera_script_run(&script, argc, argv);
 }
