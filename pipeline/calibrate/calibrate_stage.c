@@ -127,6 +127,19 @@ static int write_report(const struct lumi_run *run, const char *name, const char
     return lumi_file_write(path, text, strlen(text), false, error);
 }
 
+/* What was found before it came to nothing is as good as a reason. */
+static void refuse(const struct lumi_run *run, struct lumi_calibration *c, struct lumi_error *error)
+{
+    struct lumi_error reason = error ? *error : (struct lumi_error){0};
+    g_autofree char *refused = lumi_calibration_refusal(c, reason.text);
+
+    write_report(run, "report.txt", refused, NULL);
+    if (c->findings->len)
+        lumi_fail(error, LUMI_ERR_FORMAT, "%s; %u more to look at: %s/%s/report.txt", reason.text, c->findings->len,
+                  run->work, lumi_stage_calibrate.name);
+    lumi_calibration_finish(c);
+}
+
 static int make(struct lumi_run *run, void *state, int index, int thread, const char *path, struct lumi_error *error)
 {
     g_autofree struct lumi_frame_evidence *frames = g_new0(struct lumi_frame_evidence, (gsize)run->count);
@@ -146,10 +159,8 @@ static int make(struct lumi_run *run, void *state, int index, int thread, const 
                                            true};
     code = lumi_calibrate(run, &evidence, &tracks, &c, error);
     lumi_tracks_finish(&tracks);
-    if (code == LUMI_ERR_FORMAT && error) {
-        g_autofree char *refused = g_strdup_printf("not calibrated\n\n" TO_LOOK_AT "\n  %s.\n", error->text);
-        write_report(run, "report.txt", refused, NULL);
-    }
+    if (code == LUMI_ERR_FORMAT)
+        refuse(run, &c, error);
     if (code != LUMI_OK)
         return code;
     g_autofree char *text = lumi_calibration_text(run, &c), *json = lumi_calibration_json(run, &c);

@@ -387,7 +387,7 @@ int lumi_calibrate(const struct lumi_run *run, const struct lumi_evidence *evide
     c->used = used_frames(c);
 out:
     lumi_bundle_finish(&b);
-    if (code != LUMI_OK)
+    if (code != LUMI_OK && code != LUMI_ERR_FORMAT)
         lumi_calibration_finish(c);
     return code;
 }

@@ -78,7 +78,7 @@ struct lumi_calibration {
 };
 
 /* Poses of all frames that can be had. LUMI_ERR_FORMAT where the whole cannot: too little in common, or a prior that is
- * wrong as a whole; the text says what to do. */
+ * wrong as a whole; the text says what to do, and what was found until then is in `calibration`, to be finished too. */
 int lumi_calibrate(const struct lumi_run *run, const struct lumi_evidence *evidence, const struct lumi_tracks *tracks,
                    struct lumi_calibration *calibration, struct lumi_error *error);
 void lumi_calibration_finish(struct lumi_calibration *calibration);
@@ -105,6 +105,9 @@ int lumi_calibration_wrong_priors(const struct lumi_run *run, const struct lumi_
 /* The report, for a person and as one JSON object; free with g_free. And in a line. */
 char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibration *calibration);
 char *lumi_calibration_json(const struct lumi_run *run, const struct lumi_calibration *calibration);
+
+/* The report of one that came to nothing. */
+char *lumi_calibration_refusal(const struct lumi_calibration *calibration, const char *why);
 
 /* The frame's camera in run->rig, by name; −1. */
 int lumi_calibration_rig_camera(const struct lumi_run *run, int frame);

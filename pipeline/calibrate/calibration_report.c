@@ -161,6 +161,23 @@ static void say_frames(const struct lumi_run *run, const struct lumi_calibration
         g_string_append_printf(text, "  and %d more (report.json)\n", shown - 3 * WEAK_SHOWN);
 }
 
+static void say_findings(const struct lumi_calibration *c, GString *text)
+{
+    for (guint i = 0; i < c->findings->len; i++) {
+        const struct lumi_finding *f = &g_array_index(c->findings, struct lumi_finding, i);
+        g_string_append_printf(text, "  %s %s.\n", f->what, f->text);
+    }
+}
+
+char *lumi_calibration_refusal(const struct lumi_calibration *c, const char *why)
+{
+    GString *text = g_string_new("not calibrated\n\n" TO_LOOK_AT "\n");
+
+    g_string_append_printf(text, "  %s.\n", why);
+    say_findings(c, text);
+    return g_string_free(text, FALSE);
+}
+
 char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibration *c)
 {
     struct of_camera all = sum_up(run, c, -1);
@@ -179,10 +196,7 @@ char *lumi_calibration_text(const struct lumi_run *run, const struct lumi_calibr
                                c->refined.matched, c->refined.moved);
     if (c->findings->len)
         g_string_append(text, "\n" TO_LOOK_AT "\n");
-    for (guint i = 0; i < c->findings->len; i++) {
-        const struct lumi_finding *f = &g_array_index(c->findings, struct lumi_finding, i);
-        g_string_append_printf(text, "  %s %s.\n", f->what, f->text);
-    }
+    say_findings(c, text);
     say_cameras(run, c, text);
     say_lenses(c, text);
     say_shutter(run, c, text);

@@ -232,6 +232,7 @@ static void a_rig_that_turned_the_other_way_is_said_to_have(void **state)
     g_autofree char *advice = g_strdup_printf("direction = %d", -w.rig.direction);
     assert_non_null(strstr(error.text, advice));
     assert_non_null(strstr(error.text, "--backwards"));
+    lumi_calibration_finish(&c);
     finish_world(&w);
 }
 
@@ -372,6 +373,9 @@ static void nothing_in_common_at_all_is_an_error_that_says_what_to_do(void **sta
         w.evidence.frames[i].matches = 0;
     assert_int_equal(lumi_calibrate(&w.run, &w.evidence, &w.tracks, &c, &error), LUMI_ERR_FORMAT);
     assert_non_null(strstr(error.text, "--calibrate no"));
+    g_autofree char *refusal = lumi_calibration_refusal(&c, error.text);
+    assert_non_null(strstr(refusal, error.text));
+    lumi_calibration_finish(&c);
     finish_world(&w);
 }
 
