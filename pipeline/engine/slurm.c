@@ -88,7 +88,7 @@ static char *write_script(const struct lumi_run *run, const struct lumi_record *
     add_word(script, work);
     for (guint i = 0; i < record->arguments->len; i++)
         add_word(script, g_ptr_array_index(record->arguments, i));
-    g_string_append_printf(script, " --threads %d --share \"$share/%d\"", MAX(1, record->threads), shares);
+    g_string_append_printf(script, " --share \"$share/%d\"", shares); /* threads: as many as it is given processors */
     if (last) {
         g_string_append(script, " --output");
         add_word(script, record->output);

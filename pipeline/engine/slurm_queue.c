@@ -65,6 +65,13 @@ static bool parse_name(const char *name, const char *mark, struct lumi_task *tas
     return g_strlcpy(task->stage, parts[1], sizeof task->stage) < sizeof task->stage;
 }
 
+/* By why a task waits. "launch failed requeued held" is what becomes of one that a computer does not take, as after a
+ * crash of slurmctld that gave a job's number twice; "job requeued in held state" of one that was put back so. */
+static bool will_never_run(const char *reason)
+{
+    return strstr(reason, "NeverSatisfied") || strstr(reason, "requeued held") || strstr(reason, "requeued in held");
+}
+
 int lumi_slurm_parse_tasks(const char *text, const char *mark, GArray *tasks, struct lumi_error *error)
 {
     g_auto(GStrv) lines = g_strsplit(text, "\n", -1);
@@ -83,7 +90,7 @@ int lumi_slurm_parse_tasks(const char *text, const char *mark, GArray *tasks, st
         parts[2][strcspn(parts[2], " +")] = '\0';
         g_strlcpy(task.word, parts[2], sizeof task.word);
         task.state = state_of(parts[2]);
-        task.never = parts[3] && strstr(parts[3], "NeverSatisfied") != NULL;
+        task.never = parts[3] && will_never_run(parts[3]);
         g_array_append_val(tasks, task);
     }
     return LUMI_OK;

@@ -1,5 +1,7 @@
-add_test(NAME slurm_test COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/slurm_test.sh $<TARGET_FILE:lumi>)
-set_tests_properties(slurm_test PROPERTIES LABELS "slow;long" SKIP_RETURN_CODE 77 TIMEOUT 600)
+foreach(name slurm_test slurm_chain_test engine_chain_test)
+  add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/${name}.sh $<TARGET_FILE:lumi>)
+  set_tests_properties(${name} PROPERTIES LABELS "slow;long" SKIP_RETURN_CODE 77 TIMEOUT 1800)
+endforeach()
 
 add_executable(kill_resume kill_resume.c)
 target_link_libraries(kill_resume PRIVATE lumi_flags)

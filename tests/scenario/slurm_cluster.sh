@@ -37,9 +37,10 @@ SlurmdLogFile=$1/%n.log
 SchedulerType=sched/backfill
 SchedulerParameters=batch_sched_delay=0,sched_min_interval=0,bf_interval=1
 MpiDefault=none
+SlurmdParameters=config_overrides
 KillWait=1
-NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$(($2 + 1)) CPUs=1 RealMemory=8000 State=UNKNOWN
-NodeName=n2 NodeHostname=$host NodeAddr=127.0.0.1 Port=$(($2 + 2)) CPUs=1 RealMemory=8000 State=UNKNOWN
+NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$(($2 + 1)) CPUs=2 RealMemory=8000 State=UNKNOWN
+NodeName=n2 NodeHostname=$host NodeAddr=127.0.0.1 Port=$(($2 + 2)) CPUs=2 RealMemory=8000 State=UNKNOWN
 PartitionName=p Nodes=n1,n2 Default=YES MaxTime=INFINITE State=UP
 CONF
 }
@@ -62,11 +63,24 @@ cluster_ctld_start() {
     slurmctld -f "$SLURM_CONF" || fail "slurmctld does not start: $(cat "$cluster/slurmctld.log")"
 }
 
+await() { # WHAT COMMAND...: until it succeeds, a minute at most
+    what=$1
+    shift
+    tries=0
+    until "$@"; do
+        tries=$((tries + 1))
+        [ $tries -lt 1200 ] || fail "waited for nothing: $what; $(squeue -r 2>&1)"
+        sleep 0.05
+    done
+}
+answers() { squeue -h >/dev/null 2>&1; }
+idle() { [ -z "$(squeue -h)" ]; }
+
 # What it has not written down it forgets: job numbers would be given twice, and Slurm drains computers that see that.
 # It writes some seconds after a change.
 cluster_ctld_kill() {
     touch "$cluster/mark"
-    scontrol update jobid="$(squeue -h -o %A | head -1)" comment=x
+    scontrol update jobid="$(squeue -h -t PD -o %A | head -1)" comment=x
     tries=0
     until [ "$cluster/state/job_state" -nt "$cluster/mark" ]; do
         tries=$((tries + 1))

@@ -15,18 +15,6 @@ cd "$scratch" || exit 1
 trap 'cluster_stop; chmod -R u+w "$scratch"; rm -rf "$scratch"' EXIT
 cluster_start "$scratch/cluster"
 same() { cmp -s "$1" "$2" || fail "$1 and $2 differ: $3"; }
-await() { # WHAT COMMAND...: until it succeeds, half a minute at most
-    what=$1
-    shift
-    tries=0
-    until "$@"; do
-        tries=$((tries + 1))
-        [ $tries -lt 600 ] || fail "waited for nothing: $what; $(squeue -r 2>&1)"
-        sleep 0.05
-    done
-}
-answers() { squeue -h >/dev/null 2>&1; }
-idle() { [ -z "$(squeue -h)" ]; }
 number() { "$lumi" status a -w "$1" --json | tr -d '\n' | sed "s/.*\"stage\" : \"$2\"[^}]*\"$3\" : \([0-9]*\).*/\1/"; }
 
 "$lumi" sim shoot room --rig planar:2x3:0.03 --size 100x70 --fov 60 -o a -j 2 >/dev/null || fail "no capture"

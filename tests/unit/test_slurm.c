@@ -123,13 +123,14 @@ static void what_slurm_says_is_counted_by_stage(void **state)
                                "14|lumi.depth.0123abcd|CANCELLED by 1000\n"
                                "15_[1-4]|lumi.depth.0123abcd|PENDING|Dependency\n"
                                "16_1|lumi.depth.ffffffff|RUNNING|None\n"
-                               "17_1|other|RUNNING|None\n\n";
+                               "17_1|other|RUNNING|None\n"
+                               "18_5|lumi.geometry.0123abcd|PENDING|launch failed requeued held\n\n";
     g_autoptr(GArray) tasks = g_array_new(FALSE, TRUE, sizeof(struct lumi_task));
     struct lumi_error error = {0};
 
     (void)state;
     assert_int_equal(lumi_slurm_parse_tasks(text, "0123abcd", tasks, &error), LUMI_OK);
-    assert_int_equal(tasks->len, 4);
+    assert_int_equal(tasks->len, 5);
     const struct lumi_task *task = &g_array_index(tasks, struct lumi_task, 0);
     assert_int_equal(task[0].job, 12);
     assert_int_equal(task[0].share, 3);
@@ -138,7 +139,9 @@ static void what_slurm_says_is_counted_by_stage(void **state)
     assert_string_equal(task[1].stage, "geometry-coarse");
     assert_int_equal(task[2].state, LUMI_TASK_FAILED);
     assert_int_equal(task[3].state, LUMI_TASK_WAITING);
-    assert_int_equal(lumi_slurm_count_live(tasks), 3);
+    assert_false(task[3].never);
+    assert_true(task[4].never); /* in the queue it stays, but it will not run */
+    assert_int_equal(lumi_slurm_count_live(tasks), 4);
     assert_int_equal(lumi_slurm_parse_tasks("slurm_load_jobs error\n", "0123abcd", tasks, &error), LUMI_ERR_FORMAT);
 }
 
