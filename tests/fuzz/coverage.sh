@@ -10,7 +10,7 @@ build=$top/build/coverage
 tool() { command -v "$1" || command -v "$1-14" || command -v "$1-19" || { echo "coverage.sh: no $1" >&2 && exit 1; }; }
 profdata=$(tool llvm-profdata)
 cov=$(tool llvm-cov)
-targets="wire_frame wire_server wire_client wire_profile field tile mesh capture rig plan profile_store drive_map board_image image transforms colmap stanford features pairs masks api lumid_answer"
+targets="wire_frame wire_server wire_client wire_profile field tile mesh capture rig plan profile_store drive_map board_image image transforms colmap stanford features pairs masks places gains response grade cube icc film run_record api lumid_answer"
 
 cmake -S "$top" -B "$build" -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=Debug -DCMAKE_C_FLAGS="\
 -fprofile-instr-generate -fcoverage-mapping -DFUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION=1" >"$build.log" 2>&1 ||
