@@ -1,7 +1,12 @@
 /* The options of `lumi process` and `lumi stage` that are about light and colour. */
 #include "cli/color_options.h"
 
+#include "pipeline/color/grade.h"
+#include "proto/base/file.h"
+#include "proto/base/memory.h"
+
 #include <math.h>
+#include <string.h>
 
 struct color_options color_options;
 
@@ -46,4 +51,18 @@ int color_options_read(struct lumi_parameters *parameters, struct lumi_error *er
         LUMI_TRY(cli_parse_choice("--tone", o->tone, tones, &tone, error));
     parameters->tone = (enum lumi_tone)tone;
     return LUMI_OK;
+}
+
+int color_options_check(const struct lumi_parameters *parameters, struct lumi_error *error)
+{
+    const char *response = parameters->response;
+    uint8_t *data;
+    size_t size;
+
+    if (response && strcmp(response, "srgb") != 0 && strcmp(response, "linear") != 0 &&
+        strcmp(response, "estimate") != 0) {
+        LUMI_TRY(lumi_file_read(response, 1 << 22, &data, &size, error));
+        lumi_free(data);
+    }
+    return lumi_grade_check(parameters, error);
 }

@@ -22,5 +22,7 @@ extern struct color_options color_options;
 /* clang-format on */
 
 int color_options_read(struct lumi_parameters *parameters, struct lumi_error *error);
+/* The files that are named there are what they should be. */
+int color_options_check(const struct lumi_parameters *parameters, struct lumi_error *error);
 
 #endif

@@ -1,6 +1,7 @@
 /* A run on this computer, or on a cluster. */
 #include "cli/process_run.h"
 
+#include "cli/color_options.h"
 #include "cli/command.h"
 #include "cli/process_options.h"
 #include "pipeline/calibrate/calibrate_stage.h"
@@ -188,6 +189,7 @@ int process_run(const struct process_run *how, struct lumi_error *error)
     struct lumi_parameters parameters;
 
     LUMI_TRY(process_options_read(&parameters, error));
+    LUMI_TRY(color_options_check(&parameters, error));
     LUMI_TRY(lumi_file_check_output(how->output, how->capture, error));
     LUMI_TRY(lumi_file_check_place(how->output, error));
     if (how->record->engine == LUMI_ENGINE_LOCAL)

@@ -21,9 +21,8 @@ static int open_icc(const char *path, bool linear, struct lumi_icc **icc, struct
     return code;
 }
 
-int lumi_grade_open(const struct lumi_run *run, bool linear, struct lumi_grade *grade, struct lumi_error *error)
+static int open_grade(const struct lumi_parameters *p, bool linear, struct lumi_grade *grade, struct lumi_error *error)
 {
-    const struct lumi_parameters *p = &run->parameters;
     int code = LUMI_OK;
 
     *grade = (struct lumi_grade){
@@ -41,6 +40,20 @@ int lumi_grade_open(const struct lumi_run *run, bool linear, struct lumi_grade *
     if (code != LUMI_OK)
         lumi_grade_finish(grade);
     return code;
+}
+
+int lumi_grade_open(const struct lumi_run *run, bool linear, struct lumi_grade *grade, struct lumi_error *error)
+{
+    return open_grade(&run->parameters, linear, grade, error);
+}
+
+int lumi_grade_check(const struct lumi_parameters *parameters, struct lumi_error *error)
+{
+    struct lumi_grade grade;
+
+    LUMI_TRY(open_grade(parameters, false, &grade, error));
+    lumi_grade_finish(&grade);
+    return LUMI_OK;
 }
 
 void lumi_grade_finish(struct lumi_grade *grade)

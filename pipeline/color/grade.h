@@ -20,6 +20,9 @@ struct lumi_grade {
 /* What the run's parameters say, but for `linear`, which it is given, and the map, which changes nothing yet. */
 int lumi_grade_open(const struct lumi_run *run, bool linear, struct lumi_grade *grade, struct lumi_error *error);
 void lumi_grade_finish(struct lumi_grade *grade);
+/* Whether the files that the parameters name can be read and are what they are named for: told before the first stage
+ * rather than after hours, at the last. */
+int lumi_grade_check(const struct lumi_parameters *parameters, struct lumi_error *error);
 
 /* A view (3-channel F32, linear light) in place: white balance, profile or matrix; with `whole` also exposure and tone,
  * and the look-up table, which is given and gives sRGB-encoded values. */

@@ -93,6 +93,14 @@ expect 2 "there is no folder 'none'" "$lumi" process a -o none/x.lumi -w none.wo
 expect 2 "is a folder" "$lumi" process a -o truth -w none.work
 [ ! -e none.work/depth ] || fail "worked for a file that cannot be written"
 
+# Files that are named for the last stages are looked at before the first one.
+printf 'LUT_3D_SIZE 2\n0 0 0\n' >short.cube
+for option in "--lut short.cube" "--lut none.cube" "--icc short.cube" "--response none.txt"; do
+    # shellcheck disable=SC2086 # an option and its value
+    expect 3 "${option#* }: " "$lumi" process a -o none.lumi -w unused $options $option
+done
+[ ! -e unused ] || fail "a run with a table that is none has begun"
+
 # Pictures: near to the truth, and of the kind asked for.
 "$lumi" eval one.lumi --truth truth/transforms.json --json --sheet sheet.png --difference difference >eval.json ||
     fail "eval"
